@@ -1,0 +1,1 @@
+"""Grids: geometry, the scan made into space and time, known maps."""

@@ -1,0 +1,429 @@
+"""The conservative model of the future, W: where anything could be, and when at the earliest."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from passpmp_ti import door
+from passpmp_ti.grid.body import Body, to_poses
+from passpmp_ti.grid.distance import NO_SEED, distance_between_cells
+from passpmp_ti.grid.static_map import StaticMap
+from passpmp_ti.grid.view import Views, views_of
+from passpmp_ti.grid.window import Window, size_for
+from passpmp_ti.kernels.arrival import (
+    NEVER,
+    arrival_times,
+    cap_memory,
+    contradicted,
+)
+from passpmp_ti.kernels.check import check_states
+from passpmp_ti.kernels.visibility import (
+    BLIND_SOURCES,
+    MOVABLE_CELLS,
+    SOURCES,
+    STANDING_SOURCES,
+    STATIC_CELLS,
+    mark_sources,
+    see_cells,
+)
+from passpmp_ti.robots import Robot
+from passpmp_ti.scan import Scan
+from passpmp_ti.settings import Settings
+
+TICK = 1e-3
+"""[s]"""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FutureModel:
+    """Everywhere something could possibly be, at every future time (Sec. 4.5, Fig. 4).
+
+    The whole model is one number a cell: `ticks`, the time at which a robot disc centred anywhere
+    in the cell could first be touched. It answers for any time from `stamp` on.
+    """
+
+    robot: Robot
+    settings: Settings
+    window: Window
+    stamp: float
+    """t_k, when the scans were taken [s]."""
+    base_ticks: int
+    """Whole milliseconds at or before `stamp`; `ticks` count from here."""
+    ticks: np.ndarray
+    """[J, I] uint16 [ms]; 0: never free; 65535: never reached."""
+    seen: np.ndarray
+    """[J, I] bool: proven empty at `stamp`."""
+    marks: np.ndarray
+    """[5, J, I] uint8, 0 marks: sources, blind sources, sources behind standing things, static
+    and movable surfaces."""
+    views: Views
+    broken_premises: np.ndarray
+    """[n, 2] returns in space that the model before had proven free [m]."""
+    _body: Body = field(repr=False)
+
+    @classmethod
+    def from_scan(
+        cls,
+        scan: Scan | Sequence[Scan],
+        robot: Robot,
+        settings: Settings,
+        previous: FutureModel | None = None,
+        static_map: StaticMap | None = None,
+        *,
+        position: tuple[float, float, float] | None = None,
+    ) -> FutureModel:
+        """Build the model of what the scans saw.
+
+        Args:
+            scan: one, or several of one instant (their views are united).
+            robot: whose discs the model is grown by.
+            settings: bounds, margins and resolution.
+            previous: the model of the cycle before; what it proved is never lost.
+            static_map: surfaces that stay.
+            position: the robot's (x, y, theta) at the scan [m, m, rad]; None: the first sensor's.
+
+        Raises:
+            ValueError: scans of different instants, or a previous model that is newer or was made
+                for another robot, or on another grid.
+        """
+        scans = [scan] if isinstance(scan, Scan) else list(scan)
+        if not scans:
+            raise ValueError("FutureModel.from_scan: no scan given; give one, or several")
+        stamp = scans[0].stamp
+        apart = [s.stamp for s in scans if abs(s.stamp - stamp) > 1e-6]
+        if apart:
+            raise ValueError(
+                f"FutureModel.from_scan: scans of one instant have one stamp; got {stamp} and"
+                f" {apart[0]}; make one model after the other instead, with previous="
+            )
+        if previous is not None:
+            _check_previous(previous, robot, settings, stamp)
+        if position is None:
+            position = scans[0].pose
+        window = _window_for(scans, settings, position, previous)
+        reach_of = [
+            window.inner_radius - math.hypot(s.pose[0] - position[0], s.pose[1] - position[1])
+            for s in scans
+        ]
+        views = views_of(
+            scans,
+            _empty_discs(robot, settings, position, previous is None),
+            settings,
+            window.anchor,
+            reach_of,
+            static_map,
+        )
+        seen, marks = _rasterise(views, window, settings)
+        base = math.floor(stamp / TICK + 1e-6)
+        body = Body.of(robot, settings)
+        ticks, broken = _arrival(views, seen, marks, window, base, robot, settings, previous)
+        return cls(
+            robot, settings, window, stamp, base, ticks, seen.view(bool), marks, views, broken, body
+        )
+
+    @property
+    def origin(self) -> tuple[float, float]:
+        """World position of the outer corner of cell [0, 0] [m]."""
+        return self.window.origin
+
+    @property
+    def cell(self) -> float:
+        """Side of a cell [m]."""
+        return self.window.cell
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """(J, I)."""
+        return (self.window.size, self.window.size)
+
+    @property
+    def base(self) -> float:
+        """Time from which `ticks` count [s]."""
+        return self.base_ticks * TICK
+
+    @property
+    def sources(self) -> np.ndarray:
+        """[J, I] bool: cells that something may come out of."""
+        return (self.marks[SOURCES] == 0) | (self.marks[BLIND_SOURCES] == 0)
+
+    @property
+    def standing_sources(self) -> np.ndarray:
+        """[J, I] bool: sources from behind things that stand."""
+        return self.marks[STANDING_SOURCES] == 0
+
+    @property
+    def static(self) -> np.ndarray:
+        """[J, I] bool: cells that hold a return from a surface that stays."""
+        return self.marks[STATIC_CELLS] == 0
+
+    @property
+    def movable(self) -> np.ndarray:
+        """[J, I] bool: cells that hold a return from a surface that may move."""
+        return self.marks[MOVABLE_CELLS] == 0
+
+    def ticks_of(self, times: np.ndarray | float) -> np.ndarray:
+        """Absolute times [s] as ticks of this model, rounded up: a later time is less safe."""
+        scaled = np.asarray(times, dtype=np.float64) / TICK - self.base_ticks
+        return np.minimum(np.ceil(scaled - 1e-4), 2**30).astype(np.int32)
+
+    def occupied(self, points: np.ndarray, times: np.ndarray) -> np.ndarray:
+        """Could anything touch a robot disc centred at a point, at a time?
+
+        Args:
+            points: [n, 2] [m].
+            times: [n] absolute [s], none before `stamp`.
+
+        Returns:
+            [n] bool; False is a proof.
+
+        Raises:
+            ValueError: wrong shapes, or a time of which the model says nothing.
+        """
+        points = door.array("FutureModel.occupied", "points", points, (None, 2))
+        ticks = self._checked_ticks("FutureModel.occupied", times, len(points))
+        local = (points - np.array(self.window.anchor)).astype(np.float32)
+        cells = np.floor(local * np.float32(1 / self.cell)).astype(np.int64)
+        i = cells[:, 0] - self.window.corner[0]
+        j = cells[:, 1] - self.window.corner[1]
+        inside = (i >= 0) & (j >= 0) & (i < self.window.size) & (j < self.window.size)
+        arrival = np.zeros(len(points), dtype=np.int64)
+        arrival[inside] = self.ticks[j[inside], i[inside]]
+        return (arrival <= ticks) & (arrival != NEVER)
+
+    def passively_safe(self, states: np.ndarray, times: np.ndarray) -> np.ndarray:
+        """Whether each state can be braked to rest before anything can touch the robot (eq. 6).
+
+        Args:
+            states: [n, 5] within the robot's limits.
+            times: [n] absolute [s], none before `stamp`.
+
+        Returns:
+            [n] bool; True is a proof. A robot at rest is passively safe by definition.
+
+        Raises:
+            ValueError: wrong shapes, states beyond the robot's limits, times before `stamp`.
+        """
+        return self.proving_brakes(states, times) >= 0
+
+    def proving_brakes(self, states: np.ndarray, times: np.ndarray) -> np.ndarray:
+        """[n] index of the braking control that proves each state p-safe; -1: ICS^b (eq. 7)."""
+        owner = "FutureModel.passively_safe"
+        states = self.robot.check_states(owner, states)
+        ticks = self._checked_ticks(owner, times, len(states))
+        proof = np.zeros(len(states), dtype=np.int32)
+        if len(states):
+            check_states(
+                self._body.kind,
+                self.ticks,
+                self._body.numbers,
+                self.counts,
+                self._body.braking,
+                to_poses(states, self.window.anchor),
+                ticks,
+                proof,
+            )
+        return proof - 1
+
+    def layer(self, index: int) -> np.ndarray:
+        """[J, I] bool: cells that could be occupied at any moment of layer `index`.
+
+        Layer l covers [base + l length, base + (l + 1) length), length = settings.layer_length.
+        """
+        index = door.whole("FutureModel", "layer", index, least=0)
+        end = math.ceil((index + 1) * self.settings.layer_length / TICK - 1e-6)
+        return (self.ticks < end) & (self.ticks != NEVER)
+
+    def layers(self, count: int | None = None) -> np.ndarray:
+        """[L, J, I] bool, the time-layered occupancy grid.
+
+        Args:
+            count: how many layers; None: until twice the cycle and the longest braking after the
+                base, the interval of Property 3.
+        """
+        if count is None:
+            horizon = 2 * self.settings.cycle + self.robot.longest_braking
+            count = math.ceil(horizon / self.settings.layer_length)
+        return np.stack([self.layer(index) for index in range(count)])
+
+    @property
+    def counts(self) -> np.ndarray:
+        """[8] int32 that the check kernels read of the window and the robot."""
+        return self._body.placed(self.window.corner, self.window.size)
+
+    @property
+    def body(self) -> Body:
+        """The robot as the kernels read it."""
+        return self._body
+
+    def _checked_ticks(self, owner: str, times: object, count: int) -> np.ndarray:
+        times = door.array(owner, "times", times, (None,))
+        if len(times) != count:
+            raise ValueError(f"{owner}.times has {len(times)} elements for {count} points")
+        early = np.flatnonzero(times < self.stamp - 1e-9)
+        if len(early):
+            raise ValueError(
+                f"{owner}.times[{early[0]}] = {times[early[0]]:.6f} s is before the scan,"
+                f" {self.stamp:.6f} s: the model speaks only of what comes after it"
+            )
+        return self.ticks_of(times)
+
+
+def _check_previous(
+    previous: FutureModel, robot: Robot, settings: Settings, stamp: float
+) -> None:
+    owner = "FutureModel.from_scan.previous"
+    if previous.stamp > stamp:
+        raise ValueError(
+            f"{owner} is of {previous.stamp:.6f} s, after the scan's {stamp:.6f} s; drop the scan"
+        )
+    if previous.robot != robot:
+        raise ValueError(f"{owner} was made for another robot; start without memory")
+    if previous.cell != settings.cell:
+        raise ValueError(
+            f"{owner} has cells of {previous.cell:g} m, settings.cell is {settings.cell:g} m;"
+            " start without memory"
+        )
+    if previous.settings.object_speed < settings.object_speed or (
+        previous.settings.clearance(robot) < settings.clearance(robot)
+    ):
+        raise ValueError(
+            f"{owner} assumed slower objects or smaller margins than settings now do; what it"
+            " proved does not hold any more: start without memory"
+        )
+
+
+def _window_for(
+    scans: Sequence[Scan],
+    settings: Settings,
+    position: tuple[float, float, float],
+    previous: FutureModel | None,
+) -> Window:
+    if settings.window is not None:
+        size = settings.window
+    elif previous is not None:
+        size = previous.window.size
+    else:
+        mounted = [math.hypot(s.pose[0] - position[0], s.pose[1] - position[1]) for s in scans]
+        furthest = max(s.range_max + m for s, m in zip(scans, mounted, strict=True))
+        size = size_for(furthest, settings.cell)
+    anchor = previous.window.anchor if previous is not None else None
+    return Window.around(position[0], position[1], size, settings.cell, anchor)
+
+
+def _empty_discs(
+    robot: Robot, settings: Settings, position: tuple[float, float, float], first: bool
+) -> list[tuple[float, float, float]]:
+    """Where nobody else can be: inside the robot's own body, and what is declared clear."""
+    x, y, theta = position
+    discs = [
+        (x + offset * math.cos(theta), y + offset * math.sin(theta), radius)
+        for offset, radius in robot.discs
+    ]
+    if first and settings.clear_radius > 0:
+        discs.append((x, y, settings.clear_radius))
+    return discs
+
+
+def _rasterise(
+    views: Views, window: Window, settings: Settings
+) -> tuple[np.ndarray, np.ndarray]:
+    seen = np.empty((window.size, window.size), dtype=np.uint8)
+    marks = np.ones((5, window.size, window.size), dtype=np.uint8)
+    i0, j0 = window.corner
+    see_cells(views.view, views.beams, views.reach, i0, j0, window.cell, seen)
+    apart = settings.blind_speed is not None and settings.blind_speed < settings.object_speed
+    mark_sources(
+        views.view, views.beams, views.ranges, views.met, views.reach, views.far_side,
+        views.scans, int(apart), i0, j0, window.cell, marks,
+    )  # fmt: skip
+    return seen, marks
+
+
+def _arrival(
+    views: Views,
+    seen: np.ndarray,
+    marks: np.ndarray,
+    window: Window,
+    base: int,
+    robot: Robot,
+    settings: Settings,
+    previous: FutureModel | None,
+) -> tuple[np.ndarray, np.ndarray]:
+    """(ticks, broken premises): arrival times, never earlier than memory knows."""
+    blind_speed = settings.object_speed if settings.blind_speed is None else settings.blind_speed
+    to_source = distance_between_cells(marks[SOURCES])
+    if blind_speed > 0 and not marks[BLIND_SOURCES].all():
+        to_blind = distance_between_cells(marks[BLIND_SOURCES])
+    else:
+        to_blind = np.full(seen.shape, NO_SEED, dtype=np.float32)
+    to_unseen = distance_between_cells(seen)
+
+    clearance = settings.clearance(robot)
+    broken = np.zeros((0, 2))
+    memory, shift, age = _remembered(previous), (0, 0), -1
+    if previous is not None:
+        age = base - previous.base_ticks
+        shift = (
+            window.corner[0] - previous.window.corner[0],
+            window.corner[1] - previous.window.corner[1],
+        )
+        broken = _broken_premises(previous, views, window, age, robot, settings)
+        if len(broken):
+            memory = _without_intruders(previous, broken, age, clearance, settings)
+    ticks = np.empty(seen.shape, dtype=np.uint16)
+    arrival_times(
+        to_source, to_blind, to_unseen, memory, shift[0], shift[1], age, window.cell, clearance,
+        settings.object_speed, blind_speed, settings.stamp_error, ticks,
+    )  # fmt: skip
+    return ticks, broken
+
+
+def _remembered(previous: FutureModel | None) -> np.ndarray:
+    """What a model remembers: [J, I] uint16; one empty cell where there is no model."""
+    return np.zeros((1, 1), dtype=np.uint16) if previous is None else previous.ticks
+
+
+def _broken_premises(
+    previous: FutureModel,
+    views: Views,
+    window: Window,
+    age: int,
+    robot: Robot,
+    settings: Settings,
+) -> np.ndarray:
+    """[n, 2] returns [m] where memory says that nothing can be yet."""
+    returns = views.returns(window.anchor)
+    # Memory's margins were against errors that this return may have too, and it speaks of a
+    # cell's every point while the return is compared with its centre.
+    radius = robot.disc_radius - settings.range_noise - 2 * settings.localisation_error
+    radius -= window.cell
+    if not len(returns) or radius <= 0:
+        return np.zeros((0, 2))
+    broken = np.zeros(len(returns), dtype=np.int32)
+    contradicted(
+        (returns - np.array(window.anchor)).astype(np.float32), previous.ticks, age,
+        *previous.window.corner, window.cell, radius, broken,
+    )  # fmt: skip
+    return returns[broken == 1]
+
+
+def _without_intruders(
+    previous: FutureModel, broken: np.ndarray, age: int, clearance: float, settings: Settings
+) -> np.ndarray:
+    """Memory capped by cones from the places where a premise broke."""
+    window = previous.window
+    mask = np.ones(previous.ticks.shape, dtype=np.uint8)
+    cells = np.floor((broken - np.array(window.origin)) / window.cell).astype(int)
+    inside = ((cells >= 0) & (cells < window.size)).all(axis=1)
+    mask[cells[inside, 1], cells[inside, 0]] = 0
+    remembered = previous.ticks.copy()
+    # whoever stands there reaches behind the surface that was seen
+    grown = clearance + settings.object_width
+    cap_memory(
+        distance_between_cells(mask), window.cell, grown, settings.object_speed, age, remembered
+    )
+    return remembered

@@ -1,0 +1,1 @@
+"""Taichi only: physics as pure functions, kernels as plain loops over arrays."""

@@ -1,0 +1,103 @@
+"""Time to the goal: an eikonal equation swept over a coarse grid, and its look-up.
+
+Not part of the guarantee: a wrong guide costs time, never safety.
+"""
+
+import taichi as ti
+
+UNREACHED = 1e9
+
+Field = ti.types.ndarray(dtype=ti.f32, ndim=2)  # [J, I]
+
+
+@ti.func
+def from_neighbours(time: ti.template(), j, i, slowness):
+    """First-order upwind time of a cell; slowness: seconds to cross one cell."""
+    rows, columns = time.shape[0], time.shape[1]
+    a = UNREACHED
+    b = UNREACHED
+    if i > 0:
+        a = time[j, i - 1]
+    if i < columns - 1:
+        a = ti.min(a, time[j, i + 1])
+    if j > 0:
+        b = time[j - 1, i]
+    if j < rows - 1:
+        b = ti.min(b, time[j + 1, i])
+    low = ti.min(a, b)
+    high = ti.max(a, b)
+    result = low + slowness
+    if high - low < slowness:
+        apart = high - low
+        result = 0.5 * (low + high + ti.sqrt(2.0 * slowness * slowness - apart * apart))
+    return result
+
+
+@ti.kernel
+def sweep(
+    # in
+    slowness: Field,  # [J, I] seconds to cross a cell
+    most_rounds: ti.i32,
+    # in / out
+    time: Field,  # [J, I] seeds hold their time, the rest UNREACHED
+) -> ti.i32:
+    """Sweep in the four diagonal orders until nothing changes; returns the rounds it took."""
+    rows, columns = time.shape[0], time.shape[1]
+    rounds = 0
+    ti.loop_config(serialize=True)
+    for _ in range(1):
+        changed = 1
+        while changed == 1 and rounds < most_rounds:
+            changed = 0
+            for direction in range(4):
+                for jj in range(rows):
+                    j = jj
+                    if direction % 2 == 1:
+                        j = rows - 1 - jj
+                    for ii in range(columns):
+                        i = ii
+                        if direction >= 2:
+                            i = columns - 1 - ii
+                        better = from_neighbours(time, j, i, slowness[j, i])
+                        if better < time[j, i] - 1e-4:
+                            time[j, i] = better
+                            changed = 1
+            rounds += 1
+    return rounds
+
+
+@ti.func
+def guide_at(time: ti.template(), frame: ti.template(), x, y):
+    """Cost to go from (x, y).
+
+    frame: 0, 1 corner of cell [0, 0]; 2 cells a metre; 3, 4 goal; 5: 1 straight distance [m],
+    0 the field [s]; 6 goal tolerance [m].
+    """
+    dx = x - frame[3]
+    dy = y - frame[4]
+    cost = ti.max(ti.sqrt(dx * dx + dy * dy) - frame[6], 0.0)
+    if frame[5] < 0.5 and cost > 0.0:
+        rows, columns = time.shape[0], time.shape[1]
+        fx = ti.min(ti.max((x - frame[0]) * frame[2] - 0.5, 0.0), columns - 1.001)
+        fy = ti.min(ti.max((y - frame[1]) * frame[2] - 0.5, 0.0), rows - 1.001)
+        i = ti.cast(fx, ti.i32)
+        j = ti.cast(fy, ti.i32)
+        u = fx - i
+        v = fy - j
+        cost = (time[j, i] * (1 - u) + time[j, i + 1] * u) * (1 - v) + (
+            time[j + 1, i] * (1 - u) + time[j + 1, i + 1] * u
+        ) * v
+    return cost
+
+
+@ti.kernel
+def guide_costs(
+    # in
+    time: Field,
+    frame: ti.types.ndarray(dtype=ti.f32, ndim=1),  # [8]
+    points: ti.types.ndarray(dtype=ti.f32, ndim=2),  # [N, 2]
+    # out
+    cost: ti.types.ndarray(dtype=ti.f32, ndim=1),  # [N]
+):
+    for n in range(points.shape[0]):
+        cost[n] = guide_at(time, frame, points[n, 0], points[n, 1])

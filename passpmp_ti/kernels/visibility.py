@@ -1,0 +1,216 @@
+"""Views onto the grid: cells proven empty, and the places that something may come out of.
+
+Views are described in kernels/beams.py. A cell is seen when one view proves all of it empty. The
+border of what the views prove is walked piece by piece; a piece that is not shut marks the cells
+it touches as sources, unless another view proves its surroundings empty.
+"""
+
+import taichi as ti
+
+from passpmp_ti.kernels.beams import MOVABLE, OPEN, SHUT, SLACK, STANDING, STATIC, UNCOVERED
+
+TAU = 6.2831853
+BEARING_SLACK = 2e-5  # [rad] f32 bearings must not fall into the wrong wedge
+
+Views = ti.types.ndarray(dtype=ti.f32, ndim=2)
+Wedges = ti.types.ndarray(dtype=ti.i32, ndim=2)
+Counts = ti.types.ndarray(dtype=ti.i32, ndim=1)
+Cells = ti.types.ndarray(dtype=ti.u8, ndim=2)
+
+SOURCES, BLIND_SOURCES, STANDING_SOURCES, STATIC_CELLS, MOVABLE_CELLS = range(5)
+
+
+@ti.func
+def wedge_at(view: ti.template(), n, v, bearing):
+    """Wedge of view v that holds a bearing in the world."""
+    relative = bearing - view[v, 2]
+    relative -= TAU * ti.floor(relative / TAU)
+    return ti.min(ti.cast(relative / view[v, 3], ti.i32), n - 1)
+
+
+@ti.func
+def proves(view: ti.template(), n, reach: ti.template(), v, x, y, pad, far):
+    """Whether view v proves empty every bearing that a disc of radius `pad` spans, out to `far`."""
+    dx = x - view[v, 0]
+    dy = y - view[v, 1]
+    r = ti.sqrt(dx * dx + dy * dy)
+    ok = far <= view[v, 5]
+    if ok:
+        half = TAU
+        if r > pad:
+            half = ti.asin(ti.min(pad / r, 1.0)) + BEARING_SLACK
+        first = 0
+        count = n
+        if half < 1.6:
+            bearing = ti.atan2(dy, dx)
+            first = wedge_at(view, n, v, bearing - half)
+            last = wedge_at(view, n, v, bearing + half)
+            count = last - first + 1
+            if count <= 0:
+                count += n
+        k = 0
+        while ok and k < count:
+            w = first + k
+            if w >= n:
+                w -= n
+            ok = reach[v, w] >= far
+            k += 1
+    return ok
+
+
+@ti.kernel
+def see_cells(
+    # in
+    view: Views,  # [V, 8]
+    beams: Counts,  # [V]
+    reach: Views,  # [V, n_max]
+    corner_i: ti.i32,
+    corner_j: ti.i32,
+    cell: ti.f32,
+    # out
+    seen: Cells,  # [J, I]: 1 = all of the cell proven empty
+):
+    for j, i in seen:
+        x = (corner_i + i + 0.5) * cell
+        y = (corner_j + j + 0.5) * cell
+        empty = False
+        for v in range(view.shape[0]):
+            if not empty:
+                fx = ti.abs(x - view[v, 0]) + 0.5 * cell
+                fy = ti.abs(y - view[v, 1]) + 0.5 * cell
+                far = ti.sqrt(fx * fx + fy * fy) + SLACK
+                if far <= view[v, 5]:
+                    empty = proves(view, beams[v], reach, v, x, y, 0.7071068 * cell, far)
+        seen[j, i] = ti.cast(empty, ti.u8)
+
+
+@ti.func
+def covered(view: ti.template(), beams: ti.template(), scans, x, y):
+    """Whether any scan's field of view holds the bearing of (x, y)."""
+    result = False
+    for v in range(scans):
+        relative = ti.atan2(y - view[v, 1], x - view[v, 0]) - view[v, 2]
+        relative -= TAU * ti.floor(relative / TAU)
+        if relative < (beams[v] - 1) * view[v, 3] - BEARING_SLACK:
+            result = True
+    return result
+
+
+@ti.func
+def mark_piece(
+    view: ti.template(),
+    beams: ti.template(),
+    reach: ti.template(),
+    marks: ti.template(),
+    v,
+    scans,
+    side,
+    x,
+    y,
+    grid: ti.template(),
+    blind_apart,
+    corner_i,
+    corner_j,
+    cell,
+):
+    """Mark the cell of one sample of a border piece, unless another view sees past it."""
+    inside = False
+    pad = 0.25 * cell
+    for w in range(view.shape[0]):
+        if w != v and not inside:
+            dx = x - view[w, 0]
+            dy = y - view[w, 1]
+            far = ti.sqrt(dx * dx + dy * dy) + pad
+            if far <= view[w, 5]:
+                inside = proves(view, beams[w], reach, w, x, y, pad, far)
+    if not inside:
+        i = ti.cast(ti.floor(x / cell), ti.i32) - corner_i
+        j = ti.cast(ti.floor(y / cell), ti.i32) - corner_j
+        if i >= 0 and j >= 0 and i < grid[1] and j < grid[0]:
+            apart = side == UNCOVERED or v >= scans
+            if apart and blind_apart == 1 and not covered(view, beams, scans, x, y):
+                marks[BLIND_SOURCES, j, i] = ti.u8(0)
+            else:
+                marks[SOURCES, j, i] = ti.u8(0)
+                if side == STANDING:
+                    marks[STANDING_SOURCES, j, i] = ti.u8(0)
+
+
+@ti.kernel
+def mark_sources(
+    # in
+    view: Views,  # [V, 8]
+    beams: Counts,  # [V]
+    ranges: Views,  # [V, n_max]
+    met: Wedges,  # [V, n_max]
+    reach: Views,  # [V, n_max]
+    far_side: Wedges,  # [V, n_max]
+    scans: ti.i32,  # the first `scans` views are scans, the rest are discs known to be empty
+    blind_apart: ti.i32,  # 1: uncovered bearings have their own bound of speed
+    corner_i: ti.i32,
+    corner_j: ti.i32,
+    cell: ti.f32,
+    # out
+    marks: ti.types.ndarray(dtype=ti.u8, ndim=3),  # [5, J, I]: 0 marks
+):
+    n_max = reach.shape[1]
+    for task in range(view.shape[0] * n_max):
+        v = task // n_max
+        beam = task % n_max
+        n = beams[v]
+        if beam < n:
+            grid = ti.Vector([marks.shape[1], marks.shape[2]])
+            pace = 0.25 * cell
+            bearing = view[v, 2] + beam * view[v, 3]
+            side = far_side[v, beam]
+            r = reach[v, beam]
+            # the arc at the end of this wedge
+            if side != SHUT and r > 0.0:
+                angle = view[v, 3]
+                if beam == n - 1:
+                    angle = view[v, 4]
+                pieces = ti.cast(r * angle / pace, ti.i32) + 1
+                for k in range(pieces + 1):
+                    at = bearing + angle * k / pieces
+                    mark_piece(
+                        view, beams, reach, marks, v, scans, side,
+                        view[v, 0] + r * ti.cos(at), view[v, 1] + r * ti.sin(at),
+                        grid, blind_apart, corner_i, corner_j, cell,
+                    )
+            # the step along this beam, between the wedge before it and the wedge after it
+            before = beam - 1
+            if before < 0:
+                before = n - 1
+            other = far_side[v, before]
+            if side != SHUT or other != SHUT:
+                near = ti.min(r, reach[v, before])
+                far = ti.max(r, reach[v, before])
+                if side == SHUT or other == SHUT:
+                    # what stands in the shut wedge may be reached along its face: up to the face
+                    if met[v, beam] > 0:
+                        far = ti.max(far, ranges[v, beam])
+                kind = OPEN
+                if side == STANDING or other == STANDING:
+                    kind = STANDING
+                if side == UNCOVERED or other == UNCOVERED:
+                    kind = UNCOVERED
+                pieces = ti.cast((far - near) / pace, ti.i32) + 1
+                if far > near:
+                    for k in range(pieces + 1):
+                        at = near + (far - near) * k / pieces
+                        mark_piece(
+                            view, beams, reach, marks, v, scans, kind,
+                            view[v, 0] + at * ti.cos(bearing), view[v, 1] + at * ti.sin(bearing),
+                            grid, blind_apart, corner_i, corner_j, cell,
+                        )
+            # the surface itself
+            if met[v, beam] >= MOVABLE:
+                x = view[v, 0] + ranges[v, beam] * ti.cos(bearing)
+                y = view[v, 1] + ranges[v, beam] * ti.sin(bearing)
+                i = ti.cast(ti.floor(x / cell), ti.i32) - corner_i
+                j = ti.cast(ti.floor(y / cell), ti.i32) - corner_j
+                if i >= 0 and j >= 0 and i < grid[1] and j < grid[0]:
+                    if met[v, beam] == STATIC:
+                        marks[STATIC_CELLS, j, i] = ti.u8(0)
+                    else:
+                        marks[MOVABLE_CELLS, j, i] = ti.u8(0)

@@ -1,0 +1,1 @@
+"""From a model of the future to a verified trajectory."""

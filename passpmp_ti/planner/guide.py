@@ -1,0 +1,150 @@
+"""What it still costs to reach the goal, from anywhere: the guide of the objective."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from passpmp_ti.grid.distance import distance_to_zeros
+from passpmp_ti.grid.model import FutureModel
+from passpmp_ti.grid.static_map import StaticMap
+from passpmp_ti.kernels.guide import UNREACHED, guide_costs, sweep
+from passpmp_ti.robots import Robot
+from passpmp_ti.settings import Settings
+
+MOST_CELLS = 320
+"""Cells along the longer side of the guide's grid: it is swept every cycle."""
+SLOWEST_SHARE = 1 / 12
+"""Of the cruise speed, where something may step out at any moment."""
+WALL_SHARE = 1 / 300
+"""Of the cruise speed, inside walls: finite, so that every place has a way down."""
+MOST_ROUNDS = 12
+
+
+@dataclass(frozen=True, slots=True)
+class GuideField:
+    """Cost to go over the plane, as the tree's kernels read it."""
+
+    time: np.ndarray
+    """[J, I] float32: seconds to the goal from each cell's centre."""
+    frame: np.ndarray
+    """[8] float32, see kernels/guide.py."""
+    anchor: tuple[float, float]
+
+    def at(self, points: np.ndarray) -> np.ndarray:
+        """[n] cost to go from world points [n, 2]: seconds, or metres for the straight guide."""
+        cost = np.empty(len(points), dtype=np.float32)
+        if len(points):
+            local = (np.asarray(points) - np.array(self.anchor)).astype(np.float32)
+            guide_costs(self.time, self.frame, local, cost)
+        return cost.astype(np.float64)
+
+
+class Guide:
+    """Remembers the walls met on the way, and works out the cost to go each cycle."""
+
+    def __init__(
+        self,
+        robot: Robot,
+        settings: Settings,
+        start: tuple[float, float],
+        goals: list[tuple[float, float]],
+        anchor: tuple[float, float],
+        sensor_reach: float,
+        static_map: StaticMap | None,
+    ) -> None:
+        self._robot = robot
+        self._settings = settings
+        self._anchor = anchor
+        places = np.array([start, *goals]) - np.array(anchor)
+        pad = 0.6 * sensor_reach
+        self._low = places.min(axis=0) - pad
+        extent = places.max(axis=0) + pad - self._low
+        self._cell = max(3 * settings.cell, float(extent.max()) / MOST_CELLS)
+        columns, rows = (int(n) for n in np.ceil(extent / self._cell) + 1)
+        self._walls = np.ones((rows, columns), dtype=np.uint8)
+        if static_map is not None:
+            self._mark(self._walls, _map_points(static_map) - np.array(anchor))
+
+    def field(self, model: FutureModel, goal: tuple[float, float]) -> GuideField:
+        """The cost to go to `goal`, given what this cycle's model shows."""
+        frame = np.zeros(8, dtype=np.float32)
+        local_goal = np.array(goal) - np.array(self._anchor)
+        frame[:2] = self._low
+        frame[2] = 1 / self._cell
+        frame[3:5] = local_goal
+        # a cost of zero in the middle of the tolerance, so that plans stop well inside it
+        frame[6] = 0.4 * self._settings.goal_tolerance
+        if self._settings.guide == "euclidean":
+            frame[5] = 1
+            return GuideField(np.zeros((2, 2), dtype=np.float32), frame, self._anchor)
+        self._mark(self._walls, _centres(model, model.static) - np.array(self._anchor))
+        time = np.full(self._walls.shape, UNREACHED, dtype=np.float32)
+        rows, columns = time.shape
+        j = int(np.clip((local_goal[1] - self._low[1]) / self._cell, 0, rows - 1))
+        i = int(np.clip((local_goal[0] - self._low[0]) / self._cell, 0, columns - 1))
+        time[j, i] = 0.0
+        sweep((self._cell / self._speed(model)).astype(np.float32), MOST_ROUNDS, time)
+        return GuideField(time, frame, self._anchor)
+
+    def _speed(self, model: FutureModel) -> np.ndarray:
+        """[J, I] speed that will be safe at each place [m/s].
+
+        What can step out from behind a standing thing at distance d leaves (d - clearance) / v_b
+        seconds to brake, less the cycle and the first primitive: v = a (...).
+        """
+        settings, robot = self._settings, self._robot
+        cruise = settings.cruise_speed or robot.top_speed
+        clearance = settings.clearance(robot)
+        speed = np.full(self._walls.shape, cruise)
+        corners = np.ones(self._walls.shape, dtype=np.uint8)
+        self._mark(corners, _centres(model, model.standing_sources) - np.array(self._anchor))
+        if settings.object_speed > 0 and not corners.all():
+            room = distance_to_zeros(corners) * self._cell - clearance - settings.cell
+            spare = room / settings.object_speed - 2 * settings.cycle
+            deceleration = float(robot.parameters()[4])
+            speed = np.clip(deceleration * spare, SLOWEST_SHARE * cruise, cruise)
+        blocked = distance_to_zeros(self._walls) * self._cell < clearance + settings.cell
+        speed[blocked] = WALL_SHARE * cruise
+        return speed
+
+    def _mark(self, mask: np.ndarray, local: np.ndarray) -> None:
+        """Put zeros where the local points [n, 2] fall."""
+        cells = np.floor((local - self._low) / self._cell).astype(int)
+        rows, columns = mask.shape
+        inside = (cells >= 0).all(axis=1) & (cells[:, 0] < columns) & (cells[:, 1] < rows)
+        mask[cells[inside, 1], cells[inside, 0]] = 0
+
+
+def _centres(model: FutureModel, marked: np.ndarray) -> np.ndarray:
+    """[n, 2] world centres of marked cells [m]."""
+    j, i = np.nonzero(marked)
+    x, y = model.origin
+    return np.stack([x + (i + 0.5) * model.cell, y + (j + 0.5) * model.cell], axis=1)
+
+
+def mean_cost(times: np.ndarray, costs: np.ndarray, horizon: float) -> float:
+    """Cost to go averaged over `horizon` [s], the last value standing for what comes after.
+
+    Args:
+        times: [n] from the start of the plan [s].
+        costs: [n] cost to go then.
+    """
+    spent = float(np.sum(np.diff(times) * costs[1:])) if len(times) > 1 else 0.0
+    taken = float(times[-1] - times[0])
+    span = max(horizon, taken)
+    rest = span - taken
+    return (spent + rest * float(costs[-1])) / span if not math.isclose(span, 0) else float(costs[-1])
+
+
+def _map_points(static_map: StaticMap) -> np.ndarray:
+    """[n, 2] world centres of the map's occupied cells [m]."""
+    j, i = np.nonzero(static_map.occupied)
+    x, y, yaw = static_map.origin
+    u, v = (i + 0.5) * static_map.resolution, (j + 0.5) * static_map.resolution
+    return np.stack(
+        [x + u * math.cos(yaw) - v * math.sin(yaw), y + u * math.sin(yaw) + v * math.cos(yaw)],
+        axis=1,
+    )

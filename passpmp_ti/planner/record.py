@@ -1,0 +1,66 @@
+"""What one planning cycle saw and decided."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from passpmp_ti.grid.model import FutureModel
+    from passpmp_ti.planner.tree import Tree
+    from passpmp_ti.trajectory import Trajectory
+
+
+@dataclass(frozen=True, kw_only=True)
+class CycleRecord:
+    """One cycle of `Navigator`, for logs, pictures and judges."""
+
+    stamp: float
+    """t_k [s]."""
+    decision: str
+    """"new": a plan of this cycle's tree; "held": the remainder of the plan held; "brake": braking
+    at once, after a broken premise; "arrived": at rest at the last goal."""
+    reason: str = ""
+    """Why the plan is not a new one; empty where it is."""
+    timings: dict[str, float] = field(default_factory=dict)
+    """Seconds spent: "model", "guide", "tree", "choice", "bookkeeping", "total"."""
+    tree_nodes: int = 0
+    tree_depth: int = 0
+    tree_stopped_by: str = ""
+    """"depth", "capacity", "time" or "unsafe" (no node left that could be grown)."""
+    cost: float = float("inf")
+    """Objective of what was chosen (eq. 5)."""
+    cost_new: float = float("inf")
+    """Objective of the best plan of this cycle's tree."""
+    cost_held: float = float("inf")
+    """Objective of the remainder of the held plan."""
+    plan_time: float = 0.0
+    """Duration of the chosen trajectory, to rest [s]."""
+    decision_time: float = float("inf")
+    """delta_d of eq. 20 [s]: from t_k until the held motion, kept on, could no longer be braked."""
+    root_proved: bool = True
+    """Whether a fresh check of s_{k+1}, at this cycle's sample times, calls it p-safe."""
+    broken_premises: np.ndarray = field(default_factory=lambda: np.zeros((0, 2)))
+    """[n, 2] places [m] where a return stood in space proven free."""
+    lost_scan: str = ""
+    """Why the scan was not used; empty where it was."""
+    deviation: float = 0.0
+    """Distance between the robot and its plan at t_k [m]."""
+    goal: tuple[float, float] = (0.0, 0.0)
+    """The goal that this cycle drove to [m]."""
+
+    # what pictures are made of; None where nothing was planned
+    model: FutureModel | None = None
+    tree: Tree | None = None
+    particle_leaves: tuple[int, ...] = ()
+    """Distinct nodes of the tree at which the particles' plans end."""
+    chosen: Trajectory | None = None
+
+    @property
+    def particles(self) -> tuple[np.ndarray, ...]:
+        """Each distinct particle's plan: [m, 2] points [m]."""
+        if self.tree is None:
+            return ()
+        return tuple(self.tree.path(leaf) for leaf in self.particle_leaves)

@@ -1,0 +1,222 @@
+"""Every number that a user may set, in one place, refused at birth where it makes no sense."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, fields, replace
+from typing import Any
+
+from passpmp_ti import door
+from passpmp_ti.robots import CarLike, Robot
+
+MODES = ("conservative",)
+OPTIMIZERS = ("pso", "exhaustive")
+GUIDES = ("safe_time", "euclidean")
+DISTANCES = ("mean", "final")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Settings:
+    """What is assumed of the world, how fine the model is, and how plans are made and judged."""
+
+    # what is assumed of the world
+    mode: str = "conservative"
+    """Safety mode."""
+    object_speed: float = 2.0
+    """v_b, greatest speed of any object [m/s]; 0 is allowed: nothing moves."""
+    object_width: float = 0.4
+    """Objects are no narrower than this [m], and their corners no sharper than a right angle."""
+    blind_speed: float | None = None
+    """Greatest speed of what comes out of bearings that no sensor ever covers [m/s]; None: as
+    `object_speed`; 0: what is there stands still."""
+    clear_radius: float = 0.0
+    """Disc about the robot's start that is declared empty [m]; for robots with blind sectors."""
+
+    # margins, each added to the unsafe side
+    tracking_error: float = 0.0
+    """Greatest distance between the robot and its plan [m]."""
+    localisation_error: float = 0.0
+    """Greatest error of a pose [m]; counted twice, once for the scan and once for the robot."""
+    range_noise: float = 0.0
+    """Greatest error of a range [m]."""
+    stamp_error: float = 0.0
+    """Greatest age of a scan that its stamp does not tell [s]."""
+    map_tolerance: float = 0.1
+    """Returns nearer than this to a surface of the static map are that surface [m]."""
+
+    # how fine the model is
+    cell: float = 0.1
+    """Side of a grid cell [m]."""
+    window: int | None = None
+    """Cells along each side of the grid; None: what the sensors' range asks for."""
+    time_step: float = 0.02
+    """Time between the samples at which motions are checked [s]; an even number of ms."""
+    layer_length: float = 0.1
+    """Length of a layer of `FutureModel.layers` [s]; times are kept to 1 ms whatever this is."""
+
+    # the cycle and the tree
+    cycle: float = 0.1
+    """delta_cycle [s]; a whole number of time steps."""
+    primitives: tuple[float, ...] = (0.4, 0.8)
+    """Durations of the primitives after the first [s]; the first lasts one cycle."""
+    capacity: int = 2000
+    """Most nodes a tree may have."""
+    exploration_time: float | None = None
+    """Time budget of the tree's growth [s], t_exploration of Algorithm 2; None: no budget."""
+
+    # the choice
+    optimizer: str = "pso"
+    """"pso" (Algorithm 3) or "exhaustive" (the true optimum over the leaves)."""
+    particles: int = 100
+    """N_p."""
+    iterations: int = 30
+    """iteration_max of Algorithm 3."""
+    sub_swarms: int = 1
+    """Swarms that search apart and share their best at the end."""
+    cognitive: float = 2.0
+    """w_c of eq. 2."""
+    social: float = 2.0
+    """w_s of eq. 2."""
+    velocity_max: float = 0.3
+    """V_pmax of Algorithm 3; priorities lie in [0, 1]."""
+    guide: str = "safe_time"
+    """"safe_time": time to the goal at the speed that will be safe; "euclidean": the paper's."""
+    distance: str = "mean"
+    """"mean": the guide averaged along the plan; "final": at its last state (eq. 18)."""
+    weight_distance: float = 1.0
+    """w_d of eq. 5."""
+    weight_time: float = 0.02
+    """w_t of eq. 5."""
+    goal_tolerance: float = 0.3
+    """The goal is reached at rest within this distance [m]."""
+    cruise_speed: float | None = None
+    """The guide's idea of the robot's speed in the open [m/s]; None: the robot's top speed."""
+
+    def __post_init__(self) -> None:
+        name = "Settings"
+        door.choice(name, "mode", self.mode, MODES)
+        door.choice(name, "optimizer", self.optimizer, OPTIMIZERS)
+        door.choice(name, "guide", self.guide, GUIDES)
+        door.choice(name, "distance", self.distance, DISTANCES)
+        for field_ in ("object_speed", "clear_radius", "tracking_error", "localisation_error",
+                       "range_noise", "stamp_error", "map_tolerance", "cognitive", "social",
+                       "weight_distance", "weight_time"):
+            door.finite(name, field_, getattr(self, field_), least=0.0)
+        for field_ in ("object_width", "cell", "time_step", "layer_length", "cycle",
+                       "velocity_max", "goal_tolerance"):
+            door.finite(name, field_, getattr(self, field_), above=0.0)
+        for field_ in ("blind_speed", "exploration_time", "cruise_speed"):
+            if getattr(self, field_) is not None:
+                door.finite(name, field_, getattr(self, field_), least=0.0)
+        if self.blind_speed is not None and self.blind_speed > self.object_speed:
+            raise ValueError(
+                f"Settings.blind_speed = {self.blind_speed:g} m/s is above object_speed ="
+                f" {self.object_speed:g} m/s, which bounds every object; leave it out or lower it"
+            )
+        if self.window is not None:
+            door.whole(name, "window", self.window, least=16, most=8192)
+        for field_, most in (("capacity", 50_000_000), ("particles", 100_000),
+                             ("iterations", 100_000), ("sub_swarms", 10_000)):
+            door.whole(name, field_, getattr(self, field_), least=1, most=most)
+        if self.particles % self.sub_swarms:
+            raise ValueError(
+                f"Settings.particles = {self.particles} does not divide into sub_swarms ="
+                f" {self.sub_swarms} of one size"
+            )
+        step_ms = self.time_step * 1000
+        if abs(step_ms - round(step_ms)) > 1e-6 or round(step_ms) % 2:
+            raise ValueError(
+                f"Settings.time_step must be an even number of milliseconds; got {step_ms:g} ms;"
+                " times are whole milliseconds and a sample speaks for half a step on either side"
+            )
+        if isinstance(self.primitives, (str, bytes)) or not hasattr(self.primitives, "__iter__"):
+            raise ValueError(f"Settings.primitives must be durations [s]; got {self.primitives!r}")
+        object.__setattr__(self, "primitives", tuple(self.primitives))
+        for field_, value in [("cycle", self.cycle)] + [
+            (f"primitives[{i}]", p) for i, p in enumerate(self.primitives)
+        ]:
+            door.finite(name, field_, value, above=0.0, unit="s")
+            count = value / self.time_step
+            if abs(count - round(count)) > 1e-6:
+                raise ValueError(
+                    f"Settings.{field_} = {value:g} s must be a whole number of time steps of"
+                    f" {self.time_step:g} s, so that plans are verified and held at the same times"
+                )
+
+    @classmethod
+    def for_robot(cls, robot: Robot, **changes: Any) -> Settings:
+        """Settings that drive `robot` well, with `changes` on top.
+
+        Raises:
+            ValueError: an unknown name (the nearest is suggested), or a value out of its range.
+        """
+        if isinstance(robot, CarLike):
+            own: dict[str, Any] = dict(
+                object_speed=20.0, object_width=0.8, cell=0.25, cycle=0.1,
+                primitives=(0.6, 1.2), goal_tolerance=3.0, particles=100,
+            )
+        else:
+            own = dict(
+                object_speed=2.0, object_width=0.4, cell=0.05, cycle=0.1,
+                primitives=(0.4, 0.8), goal_tolerance=0.3, particles=50, cruise_speed=1.5,
+            )
+        return cls(**own).changed(**changes)
+
+    def changed(self, **changes: Any) -> Settings:
+        """These settings with some fields replaced; unknown names suggest the nearest."""
+        known = [f.name for f in fields(self)]
+        for given in changes:
+            if given not in known:
+                raise ValueError(
+                    f"Settings has no field {given!r}{door.nearest(given, known)};"
+                    f" it has {', '.join(known)}"
+                )
+        return replace(self, **changes)
+
+    @property
+    def step_ms(self) -> int:
+        """The time step in ticks of one millisecond."""
+        return round(self.time_step * 1000)
+
+    def steps_of(self, duration: float) -> int:
+        """A duration [s] in time steps."""
+        return round(duration / self.time_step)
+
+    @property
+    def levels(self) -> tuple[int, ...]:
+        """Steps of the primitives of each level of the tree, the cycle first."""
+        return tuple(self.steps_of(d) for d in (self.cycle, *self.primitives))
+
+    def clearance(self, robot: Robot) -> float:
+        """Distance that a disc's centre keeps from whatever may be occupied [m].
+
+        Sum of the disc's radius and of every margin in space that does not depend on the grid:
+        tracking, localisation of scan and robot, the motion between samples, the integrator.
+        """
+        return (
+            robot.disc_radius
+            + self.tracking_error
+            + 2 * self.localisation_error
+            + motion_margin(robot, self.time_step)
+            + integration_margin(robot, self.time_step)
+        )
+
+
+def motion_margin(robot: Robot, time_step: float) -> float:
+    """How far a disc's centre can be from the nearest sample of its path [m].
+
+    A sample speaks for half a step before and after it; an offset disc also swings.
+    """
+    reach = max(abs(offset) for offset, _ in robot.discs)
+    return 0.5 * time_step * (robot.top_speed + robot.top_turn_rate * reach)
+
+
+def integration_margin(robot: Robot, time_step: float) -> float:
+    """Bound on the distance between an integrated braking path and the true one [m].
+
+    The integrator is of order two: its error a step is a small share of (v dt) (w dt)^2, summed
+    over the longest braking. `tests/test_motion.py` measures order and constant.
+    """
+    turn = min(robot.top_turn_rate, math.pi) * time_step
+    braking = robot.top_speed * robot.longest_braking / 2
+    return braking * turn * turn / 12 + 1e-3

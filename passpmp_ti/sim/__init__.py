@@ -1,0 +1,1 @@
+"""The simulated world: movers, walls, range finders, scenarios, episodes and their judge."""

@@ -1,0 +1,319 @@
+"""From a scenario's YAML file to a `Scenario`, every key checked."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import os
+import re
+import xml.etree.ElementTree as ElementTree
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from passpmp_ti import door
+from passpmp_ti.grid.static_map import StaticMap
+from passpmp_ti.robots import CarLike, DifferentialDrive, Robot
+from passpmp_ti.settings import Settings
+from passpmp_ti.sim.document import Document, Section
+from passpmp_ti.sim.lidar import LABELS, Lidar
+from passpmp_ti.sim.recordings import FORMATS, Recording
+from passpmp_ti.sim.scenario import Scenario
+from passpmp_ti.sim.sources import (
+    MoverSource,
+    NobodyMoves,
+    RecordingSource,
+    ScriptSource,
+    SplineSource,
+)
+from passpmp_ti.sim.world import World
+
+ROBOTS: dict[str, type[Robot]] = {"car": CarLike, "differential": DifferentialDrive}
+DATA = "PASSPMP_DATA"
+REPOSITORY = Path(__file__).resolve().parents[2]
+
+
+def read_scenario(path: Path) -> Scenario:
+    """Read and validate one scenario file.
+
+    Raises:
+        ValueError: everything that is wrong, each with file, line and what is allowed.
+    """
+    document = Document(path)
+    root = document.root
+    robot = _robot(root)
+    world, static_map = _world(root)
+    movers = _movers(root)
+    lidars = tuple(_lidar(section) for section in root.sections("lidars"))
+    if not lidars:
+        document.blame(root.line_of("lidars"), "lidars must list at least one range finder")
+    settings = _settings(root, robot, movers, lidars)
+    start = root.array("start", (3,))
+    goals = root.array("goals", (None, 2))
+    if goals is not None and not len(goals):
+        document.blame(root.line_of("goals"), "goals must hold at least one point [x, y]")
+    duration = root.number("duration", above=0.0, unit="s")
+    description = root.text("description", "")
+    told = root.flag("static_map", False)
+    root.finish()
+    document.finish()
+    if told and static_map is None:
+        static_map = StaticMap.from_segments(world.outline)
+    try:
+        return Scenario(
+            name=path.stem, description=description, robot=robot, settings=settings, lidars=lidars,
+            bounds=world.bounds, polygons=tuple(world.polygons), walls=world.segments,
+            movers=movers, start=tuple(start.tolist()), goals=tuple(map(tuple, goals.tolist())),
+            duration=duration, static_map=static_map if told else None,
+        )
+    except ValueError as problem:
+        key = "start" if " start: " in str(problem) else "goals"
+        raise ValueError(f"{path}:{root.line_of(key)}: {problem}") from problem
+
+
+def find_data(text: str, beside: Path) -> Path:
+    """A path in a scenario file: `${PASSPMP_DATA}` is the folder of the recorded data, other
+    variables are the environment's, and what is not absolute lies beside the file.
+
+    Raises:
+        ValueError: no such file, and where it was looked for.
+    """
+    default = REPOSITORY.parent / "shared" / "data"
+    known = {DATA: str(default), **os.environ}
+    unset = [name for name in re.findall(r"\$\{(\w+)\}", text) if name not in known]
+    if unset:
+        raise ValueError(f"the environment variable {unset[0]} in {text!r} is not set")
+    filled = re.sub(r"\$\{(\w+)\}", lambda m: known[m[1]], text)
+    path = beside.parent / filled
+    if not path.is_file():
+        remedy = (
+            f"; set {DATA} to the folder that holds the recorded data" if DATA in text else ""
+        )
+        raise ValueError(f"{path}: no such file{remedy}")
+    return path
+
+
+def _robot(root: Section) -> Robot:
+    section = root.section("robot")
+    if section is None:
+        if "robot" not in root:
+            root.document.blame(root.line, "robot is missing")
+        return DifferentialDrive()
+    kind = ROBOTS.get(section.choice("type", ROBOTS), DifferentialDrive)
+    given = {}
+    for field in dataclasses.fields(kind):
+        if field.init and field.name in section:
+            given[field.name] = section.take(field.name, lambda value: value)
+        elif field.init:
+            section.take(field.name, lambda value: value, None)
+    section.finish()
+    if "discs" in given:
+        given["discs"] = _discs(section, given["discs"])
+    try:
+        return kind(**given)
+    except ValueError as problem:
+        at = next((key for key in given if f".{key}" in str(problem)), "type")
+        section.document.blame(section.line_of(at), problem)
+        return kind()
+
+
+def _discs(section: Section, value: Any) -> tuple[tuple[float, float], ...]:
+    try:
+        rows = door.array(section.name, "discs", value, (None, 2))
+    except ValueError as problem:
+        section.document.blame(section.line_of("discs"), problem)
+        return ((0.0, 0.4),)
+    return tuple((float(offset), float(radius)) for offset, radius in rows)
+
+
+def _lidar(section: Section) -> Lidar:
+    beams = section.whole("beams", least=2)
+    range_max = section.number("range_max", above=0.0, unit="m")
+    degrees = section.number("field_of_view_deg", 360.0, above=0.0, most=360.0, unit="deg")
+    mount = section.array("mount", (3,), np.zeros(3))
+    noise = section.number("noise", 0.0, least=0.0, unit="m")
+    labels = section.choice("labels", LABELS, "none")
+    section.finish()
+    return Lidar(
+        range_max=range_max or 1.0, beams=beams or 2, field_of_view=math.radians(degrees),
+        mount=tuple(mount.tolist()), noise=noise, labels=labels,
+    )
+
+
+def _settings(root: Section, robot: Robot, movers: MoverSource,
+              lidars: tuple[Lidar, ...]) -> Settings:
+    own = Settings.for_robot(robot)
+    section = root.section("settings")
+    wanted: dict[str, Any] = {}
+    noise = max((lidar.greatest_error for lidar in lidars), default=0.0)
+    if noise > own.range_noise:
+        wanted["range_noise"] = noise
+    for key, value, line in section.items() if section else []:
+        if key == "object_speed" and value == "recording":
+            if not isinstance(movers, RecordingSource):
+                root.document.blame(line, "object_speed: recording needs movers that are recorded")
+                continue
+            try:
+                value = movers.top_speed
+            except ValueError as problem:
+                root.document.blame(line, problem)
+                continue
+        try:
+            own.changed(**{key: value})
+            wanted[key] = value
+        except ValueError as problem:
+            # two settings that only fit together are tried together below
+            if key == "blind_speed":
+                wanted[key] = value
+            else:
+                root.document.blame(line, problem)
+    try:
+        return own.changed(**wanted)
+    except ValueError as problem:
+        root.document.blame(section.line if section else root.line, problem)
+        return own
+
+
+def _world(root: Section) -> tuple[World, StaticMap | None]:
+    nowhere = (0.0, 0.0, 1.0, 1.0)
+    section = root.section("world")
+    if section is None:
+        if "world" not in root:
+            root.document.blame(root.line, "world is missing; it needs bounds at least")
+        return World(nowhere), None
+    bounds = section.array("bounds", (4,))
+    polygons = section.take("polygons", _polygon_list(section), [])
+    walls = section.array("walls", (None, 4), np.zeros((0, 4)))
+    here = root.document.path
+    static_map = section.take("map", lambda text: StaticMap.load(find_data(str(text), here)), None)
+    lines = section.take("lines", lambda text: read_lines(find_data(str(text), here)), None)
+    section.finish()
+    parts = [walls]
+    if static_map is not None:
+        parts.append(static_map.segments())
+    if lines is not None:
+        parts.append(lines)
+    if bounds is None:
+        return World(nowhere), static_map
+    try:
+        world = World(tuple(bounds.tolist()), polygons, np.concatenate(parts))
+    except ValueError as problem:
+        key = "polygons" if "polygons" in str(problem) else "bounds"
+        root.document.blame(section.line_of(key), problem)
+        return World(nowhere), static_map
+    # a map holds no more than itself: with other walls beside it the planner's is drawn from all
+    alone = static_map is not None and not len(walls) and lines is None and not polygons
+    return world, static_map if alone else None
+
+
+def _polygon_list(section: Section) -> Callable[[Any], list[np.ndarray]]:
+    def check(value: Any) -> list[np.ndarray]:
+        if not isinstance(value, list):
+            raise ValueError(f"{section.name}.polygons must be a list of polygons; got {value!r}")
+        return [
+            door.array(section.name, f"polygons[{n}]", polygon, (None, 2))
+            for n, polygon in enumerate(value)
+        ]
+
+    return check
+
+
+def read_lines(path: Path) -> np.ndarray:
+    """[n, 4] walls x1, y1, x2, y2 [m] of a line file.
+
+    Either an XML file with `<Line x1= y1= x2= y2= />` elements (as OpenTraj's maps), or text with
+    four numbers a line.
+
+    Raises:
+        ValueError: neither, or no line in it.
+    """
+    try:
+        if path.suffix == ".xml":
+            found = [
+                [float(element.attrib[key]) for key in ("x1", "y1", "x2", "y2")]
+                for element in ElementTree.parse(path).iter()
+                if element.tag.split("}")[-1] == "Line"
+            ]
+            lines = np.array(found, dtype=np.float64).reshape(-1, 4)
+        else:
+            lines = np.loadtxt(path, ndmin=2)
+    except (OSError, KeyError, ValueError, ElementTree.ParseError) as cause:
+        raise ValueError(f"{path}: not a line file: {cause}") from cause
+    if not len(lines) or lines.shape[1] != 4 or not np.isfinite(lines).all():
+        raise ValueError(f"{path}: must hold lines of four finite numbers x1, y1, x2, y2 [m]")
+    return lines
+
+
+def _movers(root: Section) -> MoverSource:
+    section = root.section("movers")
+    if section is None:
+        return NobodyMoves()
+    readers = {"spline": _splines, "scripted": _script, "recording": _recording}
+    kind = section.choice("type", readers)
+    if kind not in readers:
+        return NobodyMoves()
+    source = readers[kind](section)
+    section.finish()
+    return source
+
+
+def _splines(section: Section) -> MoverSource:
+    count = section.whole("count", least=1, most=10_000)
+    radius = section.take("radius", _span(section, "radius", above=0.0))
+    speed = section.take("speed", _span(section, "speed", least=0.0))
+    keep_out = section.number("keep_out", 10.0, least=0.0, unit="m")
+    if count is None or radius is None or speed is None:
+        return NobodyMoves()
+    return SplineSource(count=count, radius=radius, speed=speed, keep_out=keep_out)
+
+
+def _span(section: Section, key: str, **limits: float) -> Callable[[Any], tuple[float, float]]:
+    def check(value: Any) -> tuple[float, float]:
+        low, high = door.array(section.name, key, value, (2,)).tolist()
+        door.finite(section.name, f"{key}[0]", low, **limits)
+        if low > high:
+            raise ValueError(f"{section.name}.{key} must be [least, greatest]; got {value!r}")
+        return low, high
+
+    return check
+
+
+def _script(section: Section) -> MoverSource:
+    paths, radii = [], []
+    for disc in section.sections("discs"):
+        radii.append(disc.number("radius", 0.25, above=0.0, unit="m"))
+        paths.append(disc.take("waypoints", _waypoints(disc)))
+        disc.finish()
+    if not paths and "discs" not in section:
+        section.document.blame(section.line, f"{section.name}.discs is missing")
+    if not paths or any(p is None for p in paths):
+        return NobodyMoves()
+    return ScriptSource(paths=tuple(paths), radius=tuple(radii))
+
+
+def _waypoints(disc: Section) -> Callable[[Any], tuple[tuple[float, float, float], ...]]:
+    def check(value: Any) -> tuple[tuple[float, float, float], ...]:
+        rows = door.array(disc.name, "waypoints", value, (None, 3))
+        if not len(rows) or (np.diff(rows[:, 0]) <= 0).any():
+            raise ValueError(f"{disc.name}.waypoints must be rows [t, x, y] with t increasing")
+        return tuple((float(t), float(x), float(y)) for t, x, y in rows)
+
+    return check
+
+
+def _recording(section: Section) -> MoverSource:
+    path = section.take("file", lambda text: find_data(str(text), section.document.path))
+    format_ = section.choice("format", FORMATS)
+    clock = section.number("clock", above=0.0, unit="frames/s")
+    edge = section.array("edge", (4,))
+    radius = section.number("radius", 0.25, above=0.0, unit="m")
+    keep_out = section.number("keep_out", 1.5, least=0.0, unit="m")
+    start_time = section.number("start_time", None, unit="s")
+    if path is None or format_ is None or clock is None or edge is None:
+        return NobodyMoves()
+    return RecordingSource(
+        recording=Recording(path=path, format=format_, clock=clock), edge=tuple(edge.tolist()),
+        radius=radius, keep_out=keep_out, start_time=start_time,
+    )
