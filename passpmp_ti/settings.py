@@ -71,7 +71,7 @@ class Settings:
     """N_p."""
     iterations: int = 30
     """iteration_max of Algorithm 3."""
-    sub_swarms: int = 1
+    sub_swarms: int = 2
     """Swarms that search apart and share their best at the end."""
     cognitive: float = 2.0
     """w_c of eq. 2."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from passpmp_ti.kernels.swarm import ROUND, iterate, scatter
+from passpmp_ti.kernels.swarm import search
 from passpmp_ti.planner.tree import Tree
 from passpmp_ti.settings import Settings
 
@@ -15,12 +15,9 @@ class Swarm:
     def __init__(self, settings: Settings) -> None:
         self._settings = settings
         particles, groups, nodes = settings.particles, settings.sub_swarms, settings.capacity
-        self._position = np.zeros((particles, nodes), dtype=np.float32)
-        self._velocity = np.zeros((particles, nodes), dtype=np.float32)
-        self._best = np.zeros((particles, nodes), dtype=np.float32)
-        self._best_cost = np.zeros(particles, dtype=np.float32)
+        self._swarm = np.zeros((particles, nodes, 3), dtype=np.float32)
         self._group = np.zeros((groups, nodes), dtype=np.float32)
-        self._group_cost = np.zeros(groups, dtype=np.float32)
+        self._best_cost = np.zeros(particles, dtype=np.float32)
         self._leaf = np.zeros(particles, dtype=np.int32)
         self._group_leaf = np.zeros(groups, dtype=np.int32)
 
@@ -38,19 +35,13 @@ class Swarm:
             (the leaf where the best plan ends, the distinct leaves of the particles at the end).
         """
         settings = self._settings
-        seed = int(generator.integers(2**32))
-        scatter(
-            seed, settings.velocity_max, tree.count, self._position, self._velocity, self._best,
-            self._best_cost, self._group, self._group_cost,
+        search(
+            int(generator.integers(2**32)), settings.iterations, settings.velocity_max,
+            settings.cognitive, settings.social, tree.link, costs, self._swarm, self._group,
+            self._best_cost, self._leaf, self._group_leaf,
         )  # fmt: skip
-        for first in range(0, settings.iterations + 1, ROUND):
-            iterate(
-                seed, first, settings.iterations, settings.velocity_max, settings.cognitive,
-                settings.social, tree.link, costs, self._position, self._velocity, self._best,
-                self._best_cost, self._group, self._group_cost, self._leaf, self._group_leaf,
-            )  # fmt: skip
         # sub-swarms share their best at the end; ties go to the lowest index
-        winner = int(np.argmin(self._group_cost))
+        winner = int(np.argmin(costs[self._group_leaf]))
         return int(self._group_leaf[winner]), tuple(int(n) for n in np.unique(self._leaf))
 
 

@@ -150,6 +150,7 @@ def _settings(root: Section, robot: Robot, movers: MoverSource,
     noise = max((lidar.greatest_error for lidar in lidars), default=0.0)
     if noise > own.range_noise:
         wanted["range_noise"] = noise
+    lines: dict[str, int] = {}
     for key, value, line in section.items() if section else []:
         if key == "object_speed" and value == "recording":
             if not isinstance(movers, RecordingSource):
@@ -160,19 +161,17 @@ def _settings(root: Section, robot: Robot, movers: MoverSource,
             except ValueError as problem:
                 root.document.blame(line, problem)
                 continue
-        try:
-            own.changed(**{key: value})
-            wanted[key] = value
-        except ValueError as problem:
-            # two settings that only fit together are tried together below
-            if key == "blind_speed":
-                wanted[key] = value
-            else:
-                root.document.blame(line, problem)
+        wanted[key] = value
+        lines[key] = line
     try:
         return own.changed(**wanted)
-    except ValueError as problem:
-        root.document.blame(section.line if section else root.line, problem)
+    except ValueError:
+        # find who is to blame: some settings bound others, so those come first
+        for key in sorted(lines, key=lambda k: k not in ("time_step", "object_speed")):
+            try:
+                own = own.changed(**{key: wanted[key]})
+            except ValueError as problem:
+                root.document.blame(lines[key], problem)
         return own
 
 

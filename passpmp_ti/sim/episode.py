@@ -1,0 +1,272 @@
+"""One drive through a scenario, and what became of it."""
+
+from __future__ import annotations
+
+import math
+import time as clock
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from passpmp_ti.planner.record import CycleRecord
+from passpmp_ti.scan import Scan
+from passpmp_ti.settings import Settings
+from passpmp_ti.sim.contacts import WALL, Contact, Judge
+from passpmp_ti.sim.scenario import Scenario, load_scenario
+from passpmp_ti.sim.world import World
+from passpmp_ti.trajectory import Trajectory
+
+JUDGE_STEP = 0.005
+"""Longest step between states that the judge connects by straight lines [s]."""
+STORE_STEP = 0.05
+"""Time between stored states, at most [s]."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class CycleInfo:
+    """What a watcher of `simulate` is shown once a cycle, after the planner has answered."""
+
+    time: float
+    """t_k, absolute [s]."""
+    world: World
+    navigator: Any
+    state: np.ndarray
+    """[5] the robot's state at t_k."""
+    scans: Sequence[Scan]
+    contacts: Sequence[Contact]
+    """Every contact so far."""
+    executing: Trajectory
+    """What the robot follows until the next cycle."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Episode:
+    """Everything that happened."""
+
+    scenario: Scenario
+    settings: Settings
+    seed: int
+    world: World
+    start_time: float
+    """[s]."""
+    reached_at: float | None
+    """When the last goal was reached [s]; None: it was not."""
+    times: np.ndarray
+    """[n] [s]."""
+    states: np.ndarray
+    """[n, 5] the robot's states then."""
+    distance: float
+    """Driven [m]."""
+    time_moving: float
+    """[s]."""
+    contacts: tuple[Contact, ...]
+    nearest_mover: float
+    """Least gap to a mover while the robot moved [m]; inf: nobody or no motion."""
+    nearest_wall: float
+    """Least gap to something fixed while the robot moved [m]."""
+    records: tuple[CycleRecord, ...]
+    """One per cycle, without the pictures' models and trees."""
+    update_times: np.ndarray
+    """[cycles] wall clock time of each planning cycle, scan to trajectory [s]."""
+
+    def summary(self) -> dict[str, Any]:
+        """The episode in numbers, SI units; None where there is nothing to tell.
+
+        Speeds, distances and contacts are the truth's, not the planner's belief. Contacts count
+        once from touch to release; they count as moving if the robot moved at any moment of them.
+        Cycle times leave out the first cycle, in which kernels may be compiled: it has its own.
+        """
+        moving = [c for c in self.contacts if c.moving]
+        rest = [c for c in self.contacts if not c.moving]
+        end = self.times[-1] if self.reached_at is None else self.reached_at
+        duration = float(end - self.start_time)
+        warm = self.update_times[1:] if len(self.update_times) > 1 else self.update_times
+        bound = self.settings.object_speed
+        return {
+            "scenario": self.scenario.name,
+            "mode": self.settings.mode,
+            "seed": self.seed,
+            "object_speed": bound,
+            "cycle": self.settings.cycle,
+            "reached_goal": self.reached_at is not None,
+            "time_to_goal": None if self.reached_at is None else duration,
+            "duration": duration,
+            "collisions_moving": len(moving),
+            "collisions_at_rest": len(rest),
+            "collisions_fixed": sum(c.mover == WALL for c in self.contacts),
+            "collisions_moving_beyond_bound": sum(c.mover_top_speed > bound for c in moving),
+            "distance_driven": self.distance,
+            "mean_speed": self.distance / duration if duration > 0 else 0.0,
+            "mean_speed_under_way": self.distance / self.time_moving if self.time_moving else 0.0,
+            "share_moving": self.time_moving / duration if duration > 0 else 0.0,
+            "nearest_approach_moving": _told(self.nearest_mover),
+            "nearest_fixed_moving": _told(self.nearest_wall),
+            "cycles": len(self.records),
+            "cycle_time_median": float(np.median(warm)),
+            "cycle_time_p99": float(np.quantile(warm, 0.99)),
+            "cycle_time_worst": float(warm.max()),
+            "cycle_time_first": float(self.update_times[0]),
+            "roots_unproved": sum(not r.root_proved for r in self.records),
+            "broken_premises": sum(len(r.broken_premises) > 0 for r in self.records),
+            "lost_scans": sum(bool(r.lost_scan) for r in self.records),
+        }
+
+    def arrays(self) -> dict[str, np.ndarray]:
+        """What happened as arrays, for `numpy.savez`; all times absolute [s]."""
+        movers = self.world.movers
+        present = np.array([movers.present(t) for t in self.times])
+        positions = movers.positions(self.times)
+        positions = np.where(present[:, :, None], positions, np.nan).astype(np.float32)
+        fields = ("mover", "start", "end", "moving", "moving_at_start", "robot_speed",
+                  "mover_speed", "mover_top_speed")
+        told = ("stamp", "cost", "cost_new", "cost_held", "plan_time", "decision_time",
+                "tree_nodes", "tree_depth", "root_proved", "deviation")
+        timings = sorted({key for r in self.records for key in r.timings})
+        return {
+            "times": self.times,
+            "states": self.states,
+            "mover_positions": positions,
+            "mover_radius": movers.radius,
+            "outline": self.world.outline,
+            "goals": np.array(self.scenario.goals),
+            **{f"contact_{k}": np.array([getattr(c, k) for c in self.contacts]) for k in fields},
+            **{f"cycle_{k}": np.array([getattr(r, k) for r in self.records]) for k in told},
+            **{f"seconds_{key}": np.array([r.timings.get(key, np.nan) for r in self.records])
+               for key in timings},
+            "cycle_decision": np.array([r.decision for r in self.records]),
+            "cycle_broken_premises": np.array([len(r.broken_premises) for r in self.records]),
+            "seconds_update": self.update_times,
+        }
+
+    def save(self, path: str | Path) -> None:
+        """Write `arrays` to a compressed .npz file."""
+        np.savez_compressed(path, **self.arrays())  # type: ignore[arg-type]
+
+
+def simulate(
+    scenario: Scenario | str | Path,
+    mode: str | None = None,
+    seed: int = 0,
+    *,
+    settings: Settings | Mapping[str, Any] | None = None,
+    on_cycle: Callable[[CycleInfo], None] | None = None,
+    planner: Callable[..., Any] | None = None,
+) -> Episode:
+    """Drive once through a scenario.
+
+    Each cycle: scan at t_k, let the planner answer, meanwhile execute until t_{k+1} what was held
+    before. Ends where the planner says the last goal is reached, or with the scenario's duration.
+
+    Args:
+        scenario: a scenario, a shipped name, or the path of a YAML file.
+        mode: safety mode; None: the scenario's.
+        seed: chooses the movers (or the time at which a recording is entered), the range
+            finders' errors and the planner's random numbers.
+        settings: all of them, or some to change.
+        on_cycle: called once a cycle.
+        planner: makes what is driven; called like `Navigator` (the default) and with its door.
+
+    Raises:
+        ValueError: an unknown scenario or setting, or a world that cannot be built.
+    """
+    if not isinstance(scenario, Scenario):
+        scenario = load_scenario(scenario)
+    chosen = settings if isinstance(settings, Settings) else scenario.settings.changed(
+        **(settings or {})
+    )
+    if mode is not None:
+        chosen = chosen.changed(mode=mode)
+    if planner is None:
+        from passpmp_ti.planner.navigator import Navigator as planner  # noqa: N813
+
+    world, state, start_time = scenario.build(seed)
+    navigator = planner(
+        scenario.robot, chosen, goal=scenario.goals, static_map=scenario.static_map, seed=seed
+    )
+    drive = _Drive(scenario, chosen, world, state, start_time)
+    errors = np.random.default_rng([seed, 1])
+    for k in range(math.ceil(scenario.duration / chosen.cycle)):
+        stamp = start_time + k * chosen.cycle
+        state = drive.state_at(stamp)
+        scans = [lidar.scan(world, state, stamp, errors) for lidar in scenario.lidars]
+        began = clock.perf_counter()
+        answer = navigator.update(scans, state)
+        drive.note(navigator.record, clock.perf_counter() - began)
+        if on_cycle is not None:
+            on_cycle(CycleInfo(
+                time=stamp, world=world, navigator=navigator, state=state, scans=scans,
+                contacts=drive.judge.contacts, executing=drive.executing,
+            ))
+        if navigator.reached:
+            drive.reached_at = stamp
+            break
+        drive.go_on(stamp, stamp + chosen.cycle)
+        drive.executing = answer
+    return drive.episode(seed)
+
+
+@dataclass
+class _Drive:
+    """The robot's truth so far."""
+
+    scenario: Scenario
+    settings: Settings
+    world: World
+    state: np.ndarray
+    start_time: float
+    reached_at: float | None = None
+    distance: float = 0.0
+    time_moving: float = 0.0
+    times: list[np.ndarray] = field(default_factory=list)
+    states: list[np.ndarray] = field(default_factory=list)
+    records: list[CycleRecord] = field(default_factory=list)
+    update_times: list[float] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        self.executing = Trajectory.resting(self.state, self.start_time)
+        self.judge = Judge(self.scenario.robot, self.world.movers, self.world.outline)
+        self.times.append(np.array([self.start_time]))
+        self.states.append(self.state[None])
+
+    def state_at(self, time: float) -> np.ndarray:
+        return self.executing.at(time)
+
+    def note(self, record: CycleRecord, seconds: float) -> None:
+        """Keep a cycle's record, without what only its own picture needs."""
+        self.records.append(
+            replace(record, model=None, tree=None, particle_leaves=(), chosen=None)
+        )
+        self.update_times.append(seconds)
+
+    def go_on(self, begin: float, end: float) -> None:
+        """Execute what is held from `begin` to `end` [s], under the judge's eyes."""
+        count = max(math.ceil((end - begin) / JUDGE_STEP - 1e-6), 1)
+        times = np.linspace(begin, end, count + 1)
+        states = self.executing.sampled(times)
+        self.judge.see(times, states)
+        rest = self.scenario.robot.at_rest(states)
+        self.distance += float(np.hypot(*np.diff(states[:, :2], axis=0).T).sum())
+        self.time_moving += float((np.diff(times)[~(rest[:-1] & rest[1:])]).sum())
+        stored = math.ceil((end - begin) / STORE_STEP - 1e-6)
+        kept = np.unique(np.linspace(0, count, max(stored, 1) + 1).round().astype(int))[1:]
+        self.times.append(times[kept])
+        self.states.append(states[kept])
+
+    def episode(self, seed: int) -> Episode:
+        return Episode(
+            scenario=self.scenario, settings=self.settings, seed=seed, world=self.world,
+            start_time=self.start_time, reached_at=self.reached_at,
+            times=np.concatenate(self.times), states=np.concatenate(self.states),
+            distance=self.distance, time_moving=self.time_moving,
+            contacts=tuple(self.judge.contacts), nearest_mover=self.judge.nearest_mover,
+            nearest_wall=self.judge.nearest_wall, records=tuple(self.records),
+            update_times=np.array(self.update_times),
+        )
+
+
+def _told(gap: float) -> float | None:
+    """A gap for a summary: None where nothing was ever near."""
+    return float(gap) if math.isfinite(gap) else None
