@@ -73,6 +73,11 @@ class Robot:
         """T_h, the longest time that any control of the braking set takes to rest [s] (eq. 21)."""
         raise NotImplementedError
 
+    @property
+    def turn_time(self) -> float:
+        """About how long a turn by a right angle takes [s]; for the guide only."""
+        raise NotImplementedError
+
     def parameters(self) -> np.ndarray:
         """[6] float32, what the motion kernels need of this robot (see kernels/motion.py)."""
         raise NotImplementedError
@@ -155,6 +160,14 @@ class CarLike(Robot):
     def longest_braking(self) -> float:
         return self.v_max / self.acceleration
 
+    @property
+    def turn_time(self) -> float:
+        # a quarter of the tightest circle at the speed at which it takes no more than the
+        # acceleration limit sideways, or the top speed, and the time to steer
+        radius = self.wheelbase / math.tan(self.xi_max)
+        speed = min(self.v_max, math.sqrt(self.acceleration * radius))
+        return 0.5 * math.pi * radius / speed + self.xi_max / self.xi_rate
+
     def parameters(self) -> np.ndarray:
         return np.array(
             [self.v_max, -self.v_reverse, self.xi_max, 0.5 / self.wheelbase, self.acceleration, 0],
@@ -209,6 +222,11 @@ class DifferentialDrive(Robot):
     @property
     def longest_braking(self) -> float:
         return 2 * self.wheel_speed / self.acceleration
+
+    @property
+    def turn_time(self) -> float:
+        # on the spot: half of it speeding up, half of it slowing down
+        return 2 * math.sqrt(0.5 * math.pi * self.track / (2 * self.acceleration))
 
     def parameters(self) -> np.ndarray:
         return np.array(

@@ -57,9 +57,9 @@ class Settings:
     # the cycle and the tree
     cycle: float = 0.1
     """delta_cycle [s]; a whole number of time steps."""
-    primitives: tuple[float, ...] = (0.4, 0.8)
+    primitives: tuple[float, ...] = (0.4, 0.6, 1.0)
     """Durations of the primitives after the first [s]; the first lasts one cycle."""
-    capacity: int = 2000
+    capacity: int = 1200
     """Most nodes a tree may have."""
     exploration_time: float | None = None
     """Time budget of the tree's growth [s], t_exploration of Algorithm 2; None: no budget."""
@@ -69,7 +69,7 @@ class Settings:
     """"pso" (Algorithm 3) or "exhaustive" (the true optimum over the leaves)."""
     particles: int = 100
     """N_p."""
-    iterations: int = 30
+    iterations: int = 60
     """iteration_max of Algorithm 3."""
     sub_swarms: int = 2
     """Swarms that search apart and share their best at the end."""
@@ -77,7 +77,7 @@ class Settings:
     """w_c of eq. 2."""
     social: float = 2.0
     """w_s of eq. 2."""
-    velocity_max: float = 0.3
+    velocity_max: float = 1.0
     """V_pmax of Algorithm 3; priorities lie in [0, 1]."""
     guide: str = "safe_time"
     """"safe_time": time to the goal at the speed that will be safe; "euclidean": the paper's."""
@@ -87,6 +87,8 @@ class Settings:
     """w_d of eq. 5."""
     weight_time: float = 0.02
     """w_t of eq. 5."""
+    weight_turn: float = 0.3
+    """Share of the time to turn towards the way down that the guide adds; 0: places alone."""
     goal_tolerance: float = 0.3
     """The goal is reached at rest within this distance [m]."""
     cruise_speed: float | None = None
@@ -100,7 +102,7 @@ class Settings:
         door.choice(name, "distance", self.distance, DISTANCES)
         for field_ in ("object_speed", "clear_radius", "tracking_error", "localisation_error",
                        "range_noise", "stamp_error", "map_tolerance", "cognitive", "social",
-                       "weight_distance", "weight_time"):
+                       "weight_distance", "weight_time", "weight_turn"):
             door.finite(name, field_, getattr(self, field_), least=0.0)
         for field_ in ("object_width", "cell", "time_step", "layer_length", "cycle",
                        "velocity_max", "goal_tolerance"):
@@ -153,12 +155,12 @@ class Settings:
         if isinstance(robot, CarLike):
             own: dict[str, Any] = dict(
                 object_speed=20.0, object_width=0.8, cell=0.25, cycle=0.1,
-                primitives=(0.6, 1.2), goal_tolerance=3.0, particles=100,
+                primitives=(0.5, 1.0, 1.5), goal_tolerance=3.0, particles=100,
             )
         else:
             own = dict(
                 object_speed=2.0, object_width=0.4, cell=0.05, cycle=0.1,
-                primitives=(0.4, 0.8), goal_tolerance=0.3, particles=50, cruise_speed=1.5,
+                primitives=(0.4, 0.6, 1.0), goal_tolerance=0.3, particles=50, cruise_speed=1.5,
             )
         return cls(**own).changed(**changes)
 

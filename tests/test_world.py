@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from passpmp_ti.sim import geometry
-from passpmp_ti.sim.movers import PathMovers, draw_spline_movers
+from passpmp_ti.sim.movers import PathMovers
 from passpmp_ti.sim.recordings import Recording, recorded_movers
+from passpmp_ti.sim.splines import draw_spline_movers
 from passpmp_ti.sim.world import World
 
 BOUNDS = (0.0, 0.0, 100.0, 100.0)

@@ -20,6 +20,7 @@ from passpmp_ti.kernels.arrival import (
     cap_memory,
     contradicted,
 )
+from passpmp_ti.kernels.beams import SLACK
 from passpmp_ti.kernels.check import check_states
 from passpmp_ti.kernels.visibility import (
     BLIND_SOURCES,
@@ -338,7 +339,7 @@ def _rasterise(
     apart = settings.blind_speed is not None and settings.blind_speed < settings.object_speed
     mark_sources(
         views.view, views.beams, views.ranges, views.met, views.reach, views.far_side,
-        views.scans, int(apart), i0, j0, window.cell, marks,
+        views.scans, int(apart), i0, j0, window.cell, 2 * settings.range_noise + SLACK, marks,
     )  # fmt: skip
     return seen, marks
 

@@ -67,11 +67,15 @@ def sweep(
 
 
 @ti.func
-def guide_at(time: ti.template(), frame: ti.template(), x, y):
-    """Cost to go from (x, y).
+def guide_at(time: ti.template(), frame: ti.template(), x, y, c, s):
+    """Cost to go from (x, y) with heading (c, s) = (cos theta, sin theta).
+
+    The field knows places, not headings: the time to turn towards its steepest descent is added,
+    fading near the goal, so that a robot that faces the wrong way finds turning worth while.
 
     frame: 0, 1 corner of cell [0, 0]; 2 cells a metre; 3, 4 goal; 5: 1 straight distance [m],
-    0 the field [s]; 6 goal tolerance [m].
+    0 the field [s]; 6 radius about the goal within which the cost is 0 [m]; 7 time that a turn
+    by a right angle takes [s].
     """
     dx = x - frame[3]
     dy = y - frame[4]
@@ -84,9 +88,15 @@ def guide_at(time: ti.template(), frame: ti.template(), x, y):
         j = ti.cast(fy, ti.i32)
         u = fx - i
         v = fy - j
-        cost = (time[j, i] * (1 - u) + time[j, i + 1] * u) * (1 - v) + (
-            time[j + 1, i] * (1 - u) + time[j + 1, i + 1] * u
-        ) * v
+        low = time[j, i] * (1 - u) + time[j, i + 1] * u
+        high = time[j + 1, i] * (1 - u) + time[j + 1, i + 1] * u
+        cost = low * (1 - v) + high * v
+        across = (time[j, i + 1] - time[j, i]) * (1 - v) + (time[j + 1, i + 1] - time[j + 1, i]) * v
+        along = high - low
+        steep = ti.sqrt(across * across + along * along)
+        if steep > 0.0 and frame[7] > 0.0:
+            facing = -(across * c + along * s) / steep
+            cost += frame[7] * (1.0 - facing) * ti.min(0.5 * cost / frame[7], 1.0)
     return cost
 
 
@@ -95,9 +105,9 @@ def guide_costs(
     # in
     time: Field,
     frame: ti.types.ndarray(dtype=ti.f32, ndim=1),  # [8]
-    points: ti.types.ndarray(dtype=ti.f32, ndim=2),  # [N, 2]
+    places: ti.types.ndarray(dtype=ti.f32, ndim=2),  # [N, 4]: x, y, cos theta, sin theta
     # out
     cost: ti.types.ndarray(dtype=ti.f32, ndim=1),  # [N]
 ):
-    for n in range(points.shape[0]):
-        cost[n] = guide_at(time, frame, points[n, 0], points[n, 1])
+    for n in range(places.shape[0]):
+        cost[n] = guide_at(time, frame, places[n, 0], places[n, 1], places[n, 2], places[n, 3])

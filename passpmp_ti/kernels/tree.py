@@ -21,7 +21,7 @@ from passpmp_ti.kernels.check import (
     robot_of,
 )
 from passpmp_ti.kernels.guide import guide_at
-from passpmp_ti.kernels.motion import X, Y, at_rest, heading_for, pose7, step
+from passpmp_ti.kernels.motion import C, S, X, Y, at_rest, heading_for, pose7, step
 
 GROWN, BRAKED = 0, 1
 """What a node is: the end of a primitive, or the rest that a braking trajectory leads to."""
@@ -103,14 +103,14 @@ def grow_level(
                         span = pace
                         if (k + 1) % pace != 0:
                             span = steps % pace
-                        spent += guide_at(guide, guide_frame, q[X], q[Y]) * span * numbers[1]
+                        spent += guide_at(guide, guide_frame, q[X], q[Y], q[C], q[S]) * span * numbers[1]
             if clear:
                 proof = proving_brake(
                     kind, arrival, numbers, counts, braking, robot, q, tick
                 )
                 store_pose(child_pose, m, q)
                 child_cost[m, 0] = cost[parent, 0] + spent
-                child_cost[m, 1] = guide_at(guide, guide_frame, q[X], q[Y])
+                child_cost[m, 1] = guide_at(guide, guide_frame, q[X], q[Y], q[C], q[S])
         child_proof[m] = proof
 
     # Slots are given in order, by one thread: the same tree on every run.
@@ -167,8 +167,8 @@ def grow_level(
                 q = step(kind, robot, q, control, 0.0, numbers[1])
                 taken += 1
                 if taken % 5 == 0:
-                    spent += guide_at(guide, guide_frame, q[X], q[Y]) * 5 * numbers[1]
-            spent += guide_at(guide, guide_frame, q[X], q[Y]) * (taken % 5) * numbers[1]
+                    spent += guide_at(guide, guide_frame, q[X], q[Y], q[C], q[S]) * 5 * numbers[1]
+            spent += guide_at(guide, guide_frame, q[X], q[Y], q[C], q[S]) * (taken % 5) * numbers[1]
             store_pose(pose, slot, q)
             link[slot, PARENT] = parent
             link[slot, CONTROL] = link[parent, PROOF]
@@ -179,4 +179,4 @@ def grow_level(
             link[slot, CHILDREN] = 0
             link[slot, WHAT] = BRAKED
             cost[slot, 0] = cost[parent, 0] + spent
-            cost[slot, 1] = guide_at(guide, guide_frame, q[X], q[Y])
+            cost[slot, 1] = guide_at(guide, guide_frame, q[X], q[Y], q[C], q[S])

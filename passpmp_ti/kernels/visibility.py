@@ -58,6 +58,76 @@ def proves(view: ti.template(), n, reach: ti.template(), v, x, y, pad, far):
     return ok
 
 
+@ti.func
+def before_wall(view: ti.template(), n, ranges: ti.template(), v, w, x, y, tolerance):
+    """Whether (x, y) is on the sensor's side of the surface that shuts wedge w of view v."""
+    a = view[v, 2] + w * view[v, 3]
+    b = a + view[v, 3]
+    last = w + 1
+    if w == n - 1:
+        b = view[v, 2]
+        last = 0
+    ra = ranges[v, w]
+    rb = ranges[v, last]
+    result = False
+    if ra > 0.0 and rb > 0.0:
+        ax = ra * ti.cos(a)
+        ay = ra * ti.sin(a)
+        bx = rb * ti.cos(b) - ax
+        by = rb * ti.sin(b) - ay
+        px = x - view[v, 0] - ax
+        py = y - view[v, 1] - ay
+        length = ti.sqrt(bx * bx + by * by)
+        # the sensor lies to the left of the way from a to b (bearings grow counter-clockwise)
+        result = bx * py - by * px >= -tolerance * length
+    return result
+
+
+@ti.func
+def keeps_out(
+    view: ti.template(),
+    n,
+    ranges: ti.template(),
+    reach: ti.template(),
+    far_side: ti.template(),
+    v,
+    x,
+    y,
+    pad,
+    tolerance,
+):
+    """Whether view v shows that no mover is within `pad` of (x, y).
+
+    Either it proves the place empty, or the place is in a wedge that a standing surface shuts,
+    on this side of it: nothing as wide as an object fits between two beams that both reached the
+    surface.
+    """
+    dx = x - view[v, 0]
+    dy = y - view[v, 1]
+    r = ti.sqrt(dx * dx + dy * dy)
+    ok = r > 2.0 * pad
+    if ok:
+        half = ti.asin(pad / r) + BEARING_SLACK
+        bearing = ti.atan2(dy, dx)
+        first = wedge_at(view, n, v, bearing - half)
+        last = wedge_at(view, n, v, bearing + half)
+        count = last - first + 1
+        if count <= 0:
+            count += n
+        k = 0
+        while ok and k < count:
+            w = first + k
+            if w >= n:
+                w -= n
+            ok = reach[v, w] >= r + pad or (
+                far_side[v, w] == SHUT and before_wall(view, n, ranges, v, w, x, y, tolerance)
+            )
+            k += 1
+    else:
+        ok = proves(view, n, reach, v, x, y, pad, r + pad)
+    return ok
+
+
 @ti.kernel
 def see_cells(
     # in
@@ -100,7 +170,9 @@ def covered(view: ti.template(), beams: ti.template(), scans, x, y):
 def mark_piece(
     view: ti.template(),
     beams: ti.template(),
+    ranges: ti.template(),
     reach: ti.template(),
+    far_side: ti.template(),
     marks: ti.template(),
     v,
     scans,
@@ -112,17 +184,16 @@ def mark_piece(
     corner_i,
     corner_j,
     cell,
+    tolerance,
 ):
     """Mark the cell of one sample of a border piece, unless another view sees past it."""
     inside = False
     pad = 0.25 * cell
     for w in range(view.shape[0]):
         if w != v and not inside:
-            dx = x - view[w, 0]
-            dy = y - view[w, 1]
-            far = ti.sqrt(dx * dx + dy * dy) + pad
-            if far <= view[w, 5]:
-                inside = proves(view, beams[w], reach, w, x, y, pad, far)
+            inside = keeps_out(
+                view, beams[w], ranges, reach, far_side, w, x, y, pad, tolerance
+            )
     if not inside:
         i = ti.cast(ti.floor(x / cell), ti.i32) - corner_i
         j = ti.cast(ti.floor(y / cell), ti.i32) - corner_j
@@ -150,6 +221,7 @@ def mark_sources(
     corner_i: ti.i32,
     corner_j: ti.i32,
     cell: ti.f32,
+    tolerance: ti.f32,  # by how much two views of one surface may differ [m]
     # out
     marks: ti.types.ndarray(dtype=ti.u8, ndim=3),  # [5, J, I]: 0 marks
 ):
@@ -173,9 +245,9 @@ def mark_sources(
                 for k in range(pieces + 1):
                     at = bearing + angle * k / pieces
                     mark_piece(
-                        view, beams, reach, marks, v, scans, side,
+                        view, beams, ranges, reach, far_side, marks, v, scans, side,
                         view[v, 0] + r * ti.cos(at), view[v, 1] + r * ti.sin(at),
-                        grid, blind_apart, corner_i, corner_j, cell,
+                        grid, blind_apart, corner_i, corner_j, cell, tolerance,
                     )
             # the step along this beam, between the wedge before it and the wedge after it
             before = beam - 1
@@ -199,9 +271,9 @@ def mark_sources(
                     for k in range(pieces + 1):
                         at = near + (far - near) * k / pieces
                         mark_piece(
-                            view, beams, reach, marks, v, scans, kind,
+                            view, beams, ranges, reach, far_side, marks, v, scans, kind,
                             view[v, 0] + at * ti.cos(bearing), view[v, 1] + at * ti.sin(bearing),
-                            grid, blind_apart, corner_i, corner_j, cell,
+                            grid, blind_apart, corner_i, corner_j, cell, tolerance,
                         )
             # the surface itself
             if met[v, beam] >= MOVABLE:

@@ -33,12 +33,15 @@ class GuideField:
     """[8] float32, see kernels/guide.py."""
     anchor: tuple[float, float]
 
-    def at(self, points: np.ndarray) -> np.ndarray:
-        """[n] cost to go from world points [n, 2]: seconds, or metres for the straight guide."""
-        cost = np.empty(len(points), dtype=np.float32)
-        if len(points):
-            local = (np.asarray(points) - np.array(self.anchor)).astype(np.float32)
-            guide_costs(self.time, self.frame, local, cost)
+    def at(self, states: np.ndarray) -> np.ndarray:
+        """[n] cost to go from states [n, 5]: seconds, or metres for the straight guide."""
+        cost = np.empty(len(states), dtype=np.float32)
+        if len(states):
+            places = np.empty((len(states), 4), dtype=np.float32)
+            places[:, :2] = states[:, :2] - np.array(self.anchor)
+            places[:, 2] = np.cos(states[:, 2])
+            places[:, 3] = np.sin(states[:, 2])
+            guide_costs(self.time, self.frame, places, cost)
         return cost.astype(np.float64)
 
 
@@ -59,10 +62,10 @@ class Guide:
         self._settings = settings
         self._anchor = anchor
         places = np.array([start, *goals]) - np.array(anchor)
-        pad = 0.6 * sensor_reach
+        pad = 0.4 * sensor_reach
         self._low = places.min(axis=0) - pad
         extent = places.max(axis=0) + pad - self._low
-        self._cell = max(3 * settings.cell, float(extent.max()) / MOST_CELLS)
+        self._cell = max(2 * settings.cell, float(extent.max()) / MOST_CELLS)
         columns, rows = (int(n) for n in np.ceil(extent / self._cell) + 1)
         self._walls = np.ones((rows, columns), dtype=np.uint8)
         if static_map is not None:
@@ -77,6 +80,7 @@ class Guide:
         frame[3:5] = local_goal
         # a cost of zero in the middle of the tolerance, so that plans stop well inside it
         frame[6] = 0.4 * self._settings.goal_tolerance
+        frame[7] = self._settings.weight_turn * self._robot.turn_time
         if self._settings.guide == "euclidean":
             frame[5] = 1
             return GuideField(np.zeros((2, 2), dtype=np.float32), frame, self._anchor)
@@ -106,7 +110,7 @@ class Guide:
             spare = room / settings.object_speed - 2 * settings.cycle
             deceleration = float(robot.parameters()[4])
             speed = np.clip(deceleration * spare, SLOWEST_SHARE * cruise, cruise)
-        blocked = distance_to_zeros(self._walls) * self._cell < clearance + settings.cell
+        blocked = distance_to_zeros(self._walls) * self._cell < clearance + 0.5 * self._cell
         speed[blocked] = WALL_SHARE * cruise
         return speed
 

@@ -203,7 +203,7 @@ class Navigator:
             common, decision=decision, reason=reason, timings=timings, tree=tree,
             tree_nodes=tree.count, tree_depth=tree.depth, tree_stopped_by=tree.stopped_by,
             cost=cost_new if decision == "new" else cost_held, cost_new=cost_new,
-            cost_held=cost_held, plan_time=self.held.end - start, decision_time=decision_time,
+            cost_held=cost_held, plan_time=max(self.held.end - start, 0.0), decision_time=decision_time,
             particle_leaves=particles, chosen=self.held,
         )  # fmt: skip
 

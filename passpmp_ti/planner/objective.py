@@ -31,6 +31,8 @@ def leaf_costs(tree: Tree, settings: Settings) -> np.ndarray:
     else:
         span = np.maximum(horizon(settings), elapsed)
         distance = (tree.cost[:, 0] + (span - elapsed) * tree.cost[:, 1]) / span
+        # a plan that ends early waits: what is averaged over the horizon lasts as long
+        elapsed = span
     f = settings.weight_distance * distance + settings.weight_time * elapsed
     f[tree.link[:, CHILDREN] != 0] = np.inf
     return f.astype(np.float32)
@@ -44,9 +46,12 @@ def trajectory_cost(
     end = turn if turn > start + 1e-9 else max(trajectory.end, start)
     samples = max(2, 1 + round((end - start) / 0.05))
     times = np.linspace(start, end, samples)
-    costs = guide.at(trajectory.sampled(times)[:, :2])
+    costs = guide.at(trajectory.sampled(times))
     if settings.distance == "final":
         distance = float(costs[-1])
     else:
         distance = mean_cost(times - start, costs, horizon(settings))
-    return settings.weight_distance * distance + settings.weight_time * (end - start)
+    taken = end - start
+    if settings.distance == "mean":
+        taken = max(taken, horizon(settings))
+    return settings.weight_distance * distance + settings.weight_time * taken

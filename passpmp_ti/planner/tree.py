@@ -201,7 +201,7 @@ class TreeGrower:
         began = time.perf_counter()
         self._pose[0] = to_poses(root[None], model.window.anchor)[0]
         self._link[0] = (NO_PARENT, 0, 0, model.ticks_of(start), proof, -1, 0, 0)
-        self._cost[0] = (0.0, guide.at(root[None, :2])[0])
+        self._cost[0] = (0.0, guide.at(root[None])[0])
         counts = model.counts
         grown = np.zeros(2, dtype=np.int32)
         first, last, depth, stopped_by = 0, 1, 0, "depth"

@@ -83,7 +83,7 @@ class Section:
         """Line of a key, or of the section where it is missing."""
         return self._keys[key][0].start_mark.line + 1 if key in self._keys else self.line
 
-    def take(self, key: str, check: Callable[[Any], T], default: Any = REQUIRED) -> T:
+    def take(self, key: str, check: Callable[[Any], Any], default: Any = REQUIRED) -> Any:
         """The value of a key, passed through `check`, which raises ValueError at a bad one.
 
         A problem is noted and the default (or None) stands in, so that reading can go on.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time as clock
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -14,15 +14,11 @@ import numpy as np
 from passpmp_ti.planner.record import CycleRecord
 from passpmp_ti.scan import Scan
 from passpmp_ti.settings import Settings
-from passpmp_ti.sim.contacts import WALL, Contact, Judge
+from passpmp_ti.sim.contacts import WALL, Contact
+from passpmp_ti.sim.drive import Drive
 from passpmp_ti.sim.scenario import Scenario, load_scenario
 from passpmp_ti.sim.world import World
 from passpmp_ti.trajectory import Trajectory
-
-JUDGE_STEP = 0.005
-"""Longest step between states that the judge connects by straight lines [s]."""
-STORE_STEP = 0.05
-"""Time between stored states, at most [s]."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -180,14 +176,16 @@ def simulate(
     if mode is not None:
         chosen = chosen.changed(mode=mode)
     if planner is None:
-        from passpmp_ti.planner.navigator import Navigator as planner  # noqa: N813
+        from passpmp_ti.planner.navigator import Navigator
 
+        planner = Navigator
     world, state, start_time = scenario.build(seed)
     navigator = planner(
         scenario.robot, chosen, goal=scenario.goals, static_map=scenario.static_map, seed=seed
     )
-    drive = _Drive(scenario, chosen, world, state, start_time)
+    drive = Drive(scenario, world, state, start_time)
     errors = np.random.default_rng([seed, 1])
+    reached_at = None
     for k in range(math.ceil(scenario.duration / chosen.cycle)):
         stamp = start_time + k * chosen.cycle
         state = drive.state_at(stamp)
@@ -201,70 +199,18 @@ def simulate(
                 contacts=drive.judge.contacts, executing=drive.executing,
             ))
         if navigator.reached:
-            drive.reached_at = stamp
+            reached_at = stamp
             break
         drive.go_on(stamp, stamp + chosen.cycle)
         drive.executing = answer
-    return drive.episode(seed)
-
-
-@dataclass
-class _Drive:
-    """The robot's truth so far."""
-
-    scenario: Scenario
-    settings: Settings
-    world: World
-    state: np.ndarray
-    start_time: float
-    reached_at: float | None = None
-    distance: float = 0.0
-    time_moving: float = 0.0
-    times: list[np.ndarray] = field(default_factory=list)
-    states: list[np.ndarray] = field(default_factory=list)
-    records: list[CycleRecord] = field(default_factory=list)
-    update_times: list[float] = field(default_factory=list)
-
-    def __post_init__(self) -> None:
-        self.executing = Trajectory.resting(self.state, self.start_time)
-        self.judge = Judge(self.scenario.robot, self.world.movers, self.world.outline)
-        self.times.append(np.array([self.start_time]))
-        self.states.append(self.state[None])
-
-    def state_at(self, time: float) -> np.ndarray:
-        return self.executing.at(time)
-
-    def note(self, record: CycleRecord, seconds: float) -> None:
-        """Keep a cycle's record, without what only its own picture needs."""
-        self.records.append(
-            replace(record, model=None, tree=None, particle_leaves=(), chosen=None)
-        )
-        self.update_times.append(seconds)
-
-    def go_on(self, begin: float, end: float) -> None:
-        """Execute what is held from `begin` to `end` [s], under the judge's eyes."""
-        count = max(math.ceil((end - begin) / JUDGE_STEP - 1e-6), 1)
-        times = np.linspace(begin, end, count + 1)
-        states = self.executing.sampled(times)
-        self.judge.see(times, states)
-        rest = self.scenario.robot.at_rest(states)
-        self.distance += float(np.hypot(*np.diff(states[:, :2], axis=0).T).sum())
-        self.time_moving += float((np.diff(times)[~(rest[:-1] & rest[1:])]).sum())
-        stored = math.ceil((end - begin) / STORE_STEP - 1e-6)
-        kept = np.unique(np.linspace(0, count, max(stored, 1) + 1).round().astype(int))[1:]
-        self.times.append(times[kept])
-        self.states.append(states[kept])
-
-    def episode(self, seed: int) -> Episode:
-        return Episode(
-            scenario=self.scenario, settings=self.settings, seed=seed, world=self.world,
-            start_time=self.start_time, reached_at=self.reached_at,
-            times=np.concatenate(self.times), states=np.concatenate(self.states),
-            distance=self.distance, time_moving=self.time_moving,
-            contacts=tuple(self.judge.contacts), nearest_mover=self.judge.nearest_mover,
-            nearest_wall=self.judge.nearest_wall, records=tuple(self.records),
-            update_times=np.array(self.update_times),
-        )
+    return Episode(
+        scenario=scenario, settings=chosen, seed=seed, world=world, start_time=start_time,
+        reached_at=reached_at, times=np.concatenate(drive.times),
+        states=np.concatenate(drive.states), distance=drive.distance,
+        time_moving=drive.time_moving, contacts=tuple(drive.judge.contacts),
+        nearest_mover=drive.judge.nearest_mover, nearest_wall=drive.judge.nearest_wall,
+        records=tuple(drive.records), update_times=np.array(drive.update_times),
+    )
 
 
 def _told(gap: float) -> float | None:

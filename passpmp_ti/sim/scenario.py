@@ -14,7 +14,7 @@ from passpmp_ti.grid.static_map import StaticMap
 from passpmp_ti.robots import Robot
 from passpmp_ti.settings import Settings
 from passpmp_ti.sim.lidar import Lidar
-from passpmp_ti.sim.sources import MoverSource, NobodyMoves
+from passpmp_ti.sim.sources import MoverSource, NobodyMoves, RecordingSource
 from passpmp_ti.sim.world import Bounds, World
 
 SHIPPED = Path(__file__).parent / "scenarios"
@@ -118,8 +118,6 @@ class Scenario:
     @property
     def recorded(self) -> bool:
         """Whether the movers are recorded people."""
-        from passpmp_ti.sim.sources import RecordingSource
-
         return isinstance(self.movers, RecordingSource)
 
 

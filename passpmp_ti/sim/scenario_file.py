@@ -4,9 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import math
-import os
-import re
-import xml.etree.ElementTree as ElementTree
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -17,22 +14,15 @@ from passpmp_ti import door
 from passpmp_ti.grid.static_map import StaticMap
 from passpmp_ti.robots import CarLike, DifferentialDrive, Robot
 from passpmp_ti.settings import Settings
+from passpmp_ti.sim.data_files import find_data, read_lines
 from passpmp_ti.sim.document import Document, Section
 from passpmp_ti.sim.lidar import LABELS, Lidar
-from passpmp_ti.sim.recordings import FORMATS, Recording
 from passpmp_ti.sim.scenario import Scenario
-from passpmp_ti.sim.sources import (
-    MoverSource,
-    NobodyMoves,
-    RecordingSource,
-    ScriptSource,
-    SplineSource,
-)
+from passpmp_ti.sim.scenario_movers import read_movers
+from passpmp_ti.sim.sources import MoverSource, RecordingSource
 from passpmp_ti.sim.world import World
 
 ROBOTS: dict[str, type[Robot]] = {"car": CarLike, "differential": DifferentialDrive}
-DATA = "PASSPMP_DATA"
-REPOSITORY = Path(__file__).resolve().parents[2]
 
 
 def read_scenario(path: Path) -> Scenario:
@@ -45,7 +35,7 @@ def read_scenario(path: Path) -> Scenario:
     root = document.root
     robot = _robot(root)
     world, static_map = _world(root)
-    movers = _movers(root)
+    movers = read_movers(root)
     lidars = tuple(_lidar(section) for section in root.sections("lidars"))
     if not lidars:
         document.blame(root.line_of("lidars"), "lidars must list at least one range finder")
@@ -71,28 +61,6 @@ def read_scenario(path: Path) -> Scenario:
     except ValueError as problem:
         key = "start" if " start: " in str(problem) else "goals"
         raise ValueError(f"{path}:{root.line_of(key)}: {problem}") from problem
-
-
-def find_data(text: str, beside: Path) -> Path:
-    """A path in a scenario file: `${PASSPMP_DATA}` is the folder of the recorded data, other
-    variables are the environment's, and what is not absolute lies beside the file.
-
-    Raises:
-        ValueError: no such file, and where it was looked for.
-    """
-    default = REPOSITORY.parent / "shared" / "data"
-    known = {DATA: str(default), **os.environ}
-    unset = [name for name in re.findall(r"\$\{(\w+)\}", text) if name not in known]
-    if unset:
-        raise ValueError(f"the environment variable {unset[0]} in {text!r} is not set")
-    filled = re.sub(r"\$\{(\w+)\}", lambda m: known[m[1]], text)
-    path = beside.parent / filled
-    if not path.is_file():
-        remedy = (
-            f"; set {DATA} to the folder that holds the recorded data" if DATA in text else ""
-        )
-        raise ValueError(f"{path}: no such file{remedy}")
-    return path
 
 
 def _robot(root: Section) -> Robot:
@@ -217,102 +185,3 @@ def _polygon_list(section: Section) -> Callable[[Any], list[np.ndarray]]:
         ]
 
     return check
-
-
-def read_lines(path: Path) -> np.ndarray:
-    """[n, 4] walls x1, y1, x2, y2 [m] of a line file.
-
-    Either an XML file with `<Line x1= y1= x2= y2= />` elements (as OpenTraj's maps), or text with
-    four numbers a line.
-
-    Raises:
-        ValueError: neither, or no line in it.
-    """
-    try:
-        if path.suffix == ".xml":
-            found = [
-                [float(element.attrib[key]) for key in ("x1", "y1", "x2", "y2")]
-                for element in ElementTree.parse(path).iter()
-                if element.tag.split("}")[-1] == "Line"
-            ]
-            lines = np.array(found, dtype=np.float64).reshape(-1, 4)
-        else:
-            lines = np.loadtxt(path, ndmin=2)
-    except (OSError, KeyError, ValueError, ElementTree.ParseError) as cause:
-        raise ValueError(f"{path}: not a line file: {cause}") from cause
-    if not len(lines) or lines.shape[1] != 4 or not np.isfinite(lines).all():
-        raise ValueError(f"{path}: must hold lines of four finite numbers x1, y1, x2, y2 [m]")
-    return lines
-
-
-def _movers(root: Section) -> MoverSource:
-    section = root.section("movers")
-    if section is None:
-        return NobodyMoves()
-    readers = {"spline": _splines, "scripted": _script, "recording": _recording}
-    kind = section.choice("type", readers)
-    if kind not in readers:
-        return NobodyMoves()
-    source = readers[kind](section)
-    section.finish()
-    return source
-
-
-def _splines(section: Section) -> MoverSource:
-    count = section.whole("count", least=1, most=10_000)
-    radius = section.take("radius", _span(section, "radius", above=0.0))
-    speed = section.take("speed", _span(section, "speed", least=0.0))
-    keep_out = section.number("keep_out", 10.0, least=0.0, unit="m")
-    if count is None or radius is None or speed is None:
-        return NobodyMoves()
-    return SplineSource(count=count, radius=radius, speed=speed, keep_out=keep_out)
-
-
-def _span(section: Section, key: str, **limits: float) -> Callable[[Any], tuple[float, float]]:
-    def check(value: Any) -> tuple[float, float]:
-        low, high = door.array(section.name, key, value, (2,)).tolist()
-        door.finite(section.name, f"{key}[0]", low, **limits)
-        if low > high:
-            raise ValueError(f"{section.name}.{key} must be [least, greatest]; got {value!r}")
-        return low, high
-
-    return check
-
-
-def _script(section: Section) -> MoverSource:
-    paths, radii = [], []
-    for disc in section.sections("discs"):
-        radii.append(disc.number("radius", 0.25, above=0.0, unit="m"))
-        paths.append(disc.take("waypoints", _waypoints(disc)))
-        disc.finish()
-    if not paths and "discs" not in section:
-        section.document.blame(section.line, f"{section.name}.discs is missing")
-    if not paths or any(p is None for p in paths):
-        return NobodyMoves()
-    return ScriptSource(paths=tuple(paths), radius=tuple(radii))
-
-
-def _waypoints(disc: Section) -> Callable[[Any], tuple[tuple[float, float, float], ...]]:
-    def check(value: Any) -> tuple[tuple[float, float, float], ...]:
-        rows = door.array(disc.name, "waypoints", value, (None, 3))
-        if not len(rows) or (np.diff(rows[:, 0]) <= 0).any():
-            raise ValueError(f"{disc.name}.waypoints must be rows [t, x, y] with t increasing")
-        return tuple((float(t), float(x), float(y)) for t, x, y in rows)
-
-    return check
-
-
-def _recording(section: Section) -> MoverSource:
-    path = section.take("file", lambda text: find_data(str(text), section.document.path))
-    format_ = section.choice("format", FORMATS)
-    clock = section.number("clock", above=0.0, unit="frames/s")
-    edge = section.array("edge", (4,))
-    radius = section.number("radius", 0.25, above=0.0, unit="m")
-    keep_out = section.number("keep_out", 1.5, least=0.0, unit="m")
-    start_time = section.number("start_time", None, unit="s")
-    if path is None or format_ is None or clock is None or edge is None:
-        return NobodyMoves()
-    return RecordingSource(
-        recording=Recording(path=path, format=format_, clock=clock), edge=tuple(edge.tolist()),
-        radius=radius, keep_out=keep_out, start_time=start_time,
-    )

@@ -9,8 +9,9 @@ from typing import Protocol
 
 import numpy as np
 
-from passpmp_ti.sim.movers import Movers, NoMovers, PathMovers, draw_spline_movers
+from passpmp_ti.sim.movers import Movers, NoMovers, PathMovers
 from passpmp_ti.sim.recordings import Recording, recorded_movers
+from passpmp_ti.sim.splines import draw_spline_movers
 from passpmp_ti.sim.world import Bounds, World
 
 START_TIMES = 20  # seeds 0 .. 19 spread over a recording

@@ -13,7 +13,7 @@ SIDE, BELOW = 276, 232
 """Width of a panel at the side and height of one below the plot [px]."""
 WIDE = 1.5
 """Scenes at least this much wider than high have their panel below."""
-TICK_GAP = 80  # pixels between ticks, about
+TICK_GAP = 65  # least pixels between ticks
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,7 +53,7 @@ def lay_out(bounds: tuple[float, float, float, float], size: tuple[int, int]) ->
 
 
 def ticks(low: float, high: float, pixels: float) -> np.ndarray:
-    """Round numbers between `low` and `high`, about 80 pixels apart."""
+    """Round numbers between `low` and `high`, so that their labels have room."""
     wanted = (high - low) * TICK_GAP / max(pixels, 1.0)
     power = 10.0 ** math.floor(math.log10(wanted))
     step = next(power * m for m in (1, 2, 5, 10) if power * m >= wanted * 0.999)

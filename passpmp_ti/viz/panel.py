@@ -12,9 +12,12 @@ import numpy as np
 from passpmp_ti.viz import palette, text
 from passpmp_ti.viz.palette import Colour
 
-ROW, SIZE, HEAD = 25, 15, 14
+ROW, SIZE, HEAD = 23, 15, 14
 SWATCH = 26
+MARGIN = 6  # the ends of thick lines stand out
 NOTE_LINES = 3
+CLOSE_UP_HEAD = 30
+"""Height of the heading of a close-up [px]."""
 
 AREA, HATCH, LINE, DISC, STAR = "area", "hatch", "line", "disc", "star"
 
@@ -39,27 +42,39 @@ class Entry:
     width: int = 2
 
 
-def draw(page: np.ndarray, place: tuple[int, int, int, int], below: bool,
-         readings: Sequence[Reading], note: str, legend: Sequence[Entry]) -> None:
+def draw(page: np.ndarray, place: tuple[int, int, int, int], below: bool, heading: str,
+         readings: Sequence[Reading], note: str, legend: Sequence[Entry]) -> int:
     """Write readings, a note and the legend into a panel.
 
     Args:
         page: [H, W, 3] uint8, changed in place.
         place: the panel (x, y, width, height) [px].
         below: the panel lies below the plot: columns side by side.
+        heading: above the readings.
         readings: values of the moment.
         note: a sentence, may be empty.
         legend: what each colour means.
+
+    Returns:
+        The y at which the panel is free again [px].
     """
     x, y, w, h = place
-    page[y : y + h, x : x + w] = palette.PAGE
+    page[y : y + h, x - MARGIN : x + w + MARGIN] = palette.PAGE
     if below:
         half = min(w // 2 - 24, 560)
-        _readings(page, (x, y, half), readings, note, columns=2)
+        _readings(page, (x, y, half), heading, readings, note, columns=2)
         _legend(page, (x + w // 2 + 12, y, w // 2 - 12), legend, columns=max(1, w // 2 // 230))
-    else:
-        foot = _readings(page, (x, y, w), readings, note, columns=1)
-        _legend(page, (x, foot, w), legend, columns=1)
+        return y + h
+    foot = _readings(page, (x, y, w), heading, readings, note, columns=1)
+    return _legend(page, (x, foot, w), legend, columns=1)
+
+
+def draw_close_up(page: np.ndarray, x: int, y: int, picture: np.ndarray, words: str) -> None:
+    """Put a picture [s, s, 3] into a panel at (x, y), under a heading."""
+    side = picture.shape[0]
+    top = _heading(page, x, y, side, words) + 4
+    page[top : top + side, x : x + side] = picture
+    cv2.rectangle(page, (x - 1, top - 1), (x + side, top + side), palette.MUTED, 1)
 
 
 def _heading(page: np.ndarray, x: int, y: int, width: int, words: str) -> int:
@@ -68,10 +83,10 @@ def _heading(page: np.ndarray, x: int, y: int, width: int, words: str) -> int:
     return y + 24
 
 
-def _readings(page: np.ndarray, place: tuple[int, int, int], readings: Sequence[Reading],
-              note: str, columns: int) -> int:
+def _readings(page: np.ndarray, place: tuple[int, int, int], heading: str,
+              readings: Sequence[Reading], note: str, columns: int) -> int:
     x, y, w = place
-    top = _heading(page, x, y, w, "This cycle")
+    top = _heading(page, x, y, w, heading)
     rows = -(-len(readings) // columns)
     column = (w - 28 * (columns - 1)) // columns
     for n, reading in enumerate(readings):
@@ -86,11 +101,11 @@ def _readings(page: np.ndarray, place: tuple[int, int, int], readings: Sequence[
     lines = textwrap.wrap(note, letters, max_lines=NOTE_LINES, placeholder=" ...")
     for n, words in enumerate(lines):
         text.draw(page, words, (x, foot + 14 + 19 * n), palette.INK, HEAD)
-    return foot + 19 * NOTE_LINES + 14
+    return foot + 19 * NOTE_LINES + 8
 
 
 def _legend(page: np.ndarray, place: tuple[int, int, int], legend: Sequence[Entry],
-            columns: int) -> None:
+            columns: int) -> int:
     x, y, w = place
     top = _heading(page, x, y, w, "Legend")
     rows = -(-len(legend) // columns)
@@ -100,6 +115,7 @@ def _legend(page: np.ndarray, place: tuple[int, int, int], legend: Sequence[Entr
         middle = top + (n % rows) * ROW + 16
         _swatch(page, at_x, middle, entry)
         text.draw(page, entry.label, (at_x + SWATCH + 10, middle + 5), palette.INK, HEAD)
+    return top + rows * ROW + 16
 
 
 def _swatch(page: np.ndarray, x: int, middle: int, entry: Entry) -> None:

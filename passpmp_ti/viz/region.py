@@ -10,9 +10,7 @@ import numpy as np
 from passpmp_ti import door
 from passpmp_ti.grid.model import FutureModel
 from passpmp_ti.robots import CAR, Robot
-
-Bounds = tuple[float, float, float, float]
-"""(x low, y low, x high, y high) [m]."""
+from passpmp_ti.viz.plot import Bounds
 
 
 @dataclass(frozen=True, slots=True, eq=False)

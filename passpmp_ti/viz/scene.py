@@ -11,17 +11,22 @@ import numpy as np
 from passpmp_ti.planner.record import CycleRecord
 from passpmp_ti.robots import Robot
 from passpmp_ti.viz import palette, panel
+from passpmp_ti.viz.branches import Branches, branches_of
 from passpmp_ti.viz.canvas import Canvas
 from passpmp_ti.viz.panel import Entry, Reading
+from passpmp_ti.viz.plot import Bounds, Plot
 from passpmp_ti.viz.region import Region, braking_ics
 
 if TYPE_CHECKING:
+    from passpmp_ti.grid.model import FutureModel
     from passpmp_ti.sim.world import World
 
 TAIL, TAIL_POINTS = 1.2, 9
 """Length of the trail of a moving object [s]."""
-LEAST_ROBOT = 5.0
-"""The robot is drawn at least this large [px]."""
+MAGNIFY, LEAST_CLOSE_UP = 2.5, 150
+"""How much larger the close-up is, and its least side [px]."""
+LEAST_ROBOT, LARGE_ROBOT = 5.0, 14.0
+"""The robot is drawn at least this large, and pale from there on [px]."""
 DECISIONS = {"new": "new plan", "held": "plan held", "brake": "braking", "arrived": "arrived"}
 
 ENTRIES = (
@@ -73,82 +78,109 @@ def draw_cycle(moment: Moment, canvas: Canvas, *, region_states: int = 20_000) -
     Returns:
         [H, W, 3] uint8 (red, green, blue).
     """
+    tree = moment.record.tree
+    branches = None if tree is None else branches_of(tree)
     canvas.clear()
-    region = _region(moment, canvas, region_states)
-    if region is not None:
-        canvas.region(~region.safe, region.origin, region.cell, palette.ICS)
-    model = moment.record.model
-    if model is not None:
-        outside = ~canvas.sampled(model.seen, model.origin, model.cell)
-        canvas.shade(outside)
-    draw_world(moment.world, moment.time, canvas)
-    _draw_tree(moment.record, canvas)
-    canvas.line(moment.trail, palette.EXECUTED, 3)
-    _draw_choice(moment, canvas)
-    for goal in moment.goals:
-        canvas.dot(np.asarray(goal), 5, palette.GOAL)
-    canvas.star(np.asarray(moment.record.goal), 11, palette.GOAL)
-    draw_robot(moment.robot, moment.state, canvas)
-    place, below = canvas.layout.panel, canvas.layout.panel_below
-    panel.draw(canvas.page, place, below, _readings(moment), _note(moment), _legend(region))
+    region = _region(moment, canvas.bounds, region_states)
+    _paint(moment, canvas, region, branches)
+    (x, y, w, h), below = canvas.layout.panel, canvas.layout.panel_below
+    foot = panel.draw(canvas.page, (x, y, w, h), below, "This cycle", _readings(moment),
+                      moment.record.lost_scan or moment.record.reason, _legend(region))
+    side = min(w, y + h - foot - panel.CLOSE_UP_HEAD)
+    if side >= LEAST_CLOSE_UP:
+        half = 0.5 * side / (MAGNIFY * canvas.scale)
+        near = Plot(_bounds_near(moment, half), (side, side))
+        _paint(moment, near, _region(moment, near.bounds, region_states // 4), branches)
+        panel.draw_close_up(canvas.page, x, foot, near.sheet, f"Close-up, {2 * half:.0f} m wide")
     return canvas.image()
 
 
-def draw_world(world: World, time: float, canvas: Canvas) -> None:
+def _paint(moment: Moment, plot: Plot, region: Region | None, branches: Branches | None) -> None:
+    """Everything that has a place in the world, the nearest to the eye last."""
+    if region is not None:
+        plot.region(~region.safe, region.origin, region.cell, palette.ICS)
+    if moment.record.model is not None:
+        shade_unseen(moment.record.model, plot)
+    draw_world(moment.world, moment.time, plot)
+    plot.line(moment.trail, palette.EXECUTED, 3)
+    draw_robot(moment.robot, moment.state, plot)
+    if branches is not None and moment.record.tree is not None:
+        plot.lines(branches.rejected, palette.UNSAFE, 1)
+        plot.lines(branches.safe, palette.SAFE, 1)
+        plot.lines(branches.braking, palette.BRAKING, 2)
+        leaves = moment.record.particle_leaves
+        plot.lines(branches.through(moment.record.tree, leaves), palette.PARTICLE, 1)
+    _draw_choice(moment, plot)
+    for goal in moment.goals:
+        plot.dot(np.asarray(goal), 5, palette.GOAL)
+    plot.star(np.asarray(moment.record.goal), 11, palette.GOAL)
+
+
+def _bounds_near(moment: Moment, half: float) -> Bounds:
+    """A square about the robot, the faster it goes the further ahead [m]."""
+    x, y, theta = (float(v) for v in moment.state[:3])
+    ahead = 0.7 * half * float(moment.robot.speed(moment.state)) / moment.robot.top_speed
+    x, y = x + ahead * math.cos(theta), y + ahead * math.sin(theta)
+    return (x - half, y - half, x + half, y + half)
+
+
+def shade_unseen(model: FutureModel, plot: Plot) -> None:
+    """Hatch what the scan did not see and memory does not know to be free."""
+    known = model.seen | (model.ticks > model.ticks_of(model.stamp))
+    plot.shade(~plot.sampled(known, model.origin, model.cell))
+
+
+def draw_world(world: World, time: float, plot: Plot) -> None:
     """The things that stay, and those that move at `time` [s] with where they came from."""
     for polygon in world.polygons:
-        canvas.fill(polygon, palette.STATIC)
-    canvas.lines([s.reshape(2, 2) for s in world.segments], palette.STATIC, 2)
+        plot.fill(polygon, palette.STATIC)
+    plot.lines(world.segments.reshape(-1, 2, 2), palette.STATIC, 2)
     movers = world.movers
     present = movers.present(time)
     if not np.any(present):
         return
     tails = np.stack([movers.at(time - TAIL * s) for s in np.linspace(1, 0, TAIL_POINTS)], axis=1)
-    canvas.lines(list(tails[present]), palette.TRAIL, 3)
+    plot.lines(tails[present], palette.TRAIL, 3)
     for centre, radius in zip(movers.at(time)[present], movers.radius[present], strict=True):
-        canvas.disc(centre, float(radius), palette.MOVER)
+        plot.disc(centre, float(radius), palette.MOVER)
 
 
-def draw_robot(robot: Robot, state: np.ndarray, canvas: Canvas) -> None:
-    """The robot's body with a mark towards its front."""
-    x, y, theta = (float(v) for v in state[:3])
-    ahead = np.array([math.cos(theta), math.sin(theta)])
-    least = LEAST_ROBOT / canvas.layout.scale
-    here = np.array([x, y])
-    for offset, radius in robot.discs:
-        canvas.disc(here + offset * ahead, max(radius, least) + 1.5 / canvas.layout.scale,
-                    palette.FLOOR)
-    for offset, radius in robot.discs:
-        canvas.disc(here + offset * ahead, max(radius, least), palette.ROBOT)
-    length = max(robot.radius, least)
+def draw_robot(robot: Robot, state: np.ndarray, plot: Plot) -> None:
+    """The robot's body with a mark towards its front; a large one pale, for what lies over it."""
+    here = state[:2]
+    ahead = np.array([math.cos(state[2]), math.sin(state[2])])
+    pixel = 1.0 / plot.scale
+    body = [(here + offset * ahead, max(radius, LEAST_ROBOT * pixel))
+            for offset, radius in robot.discs]
+    large = robot.radius > LARGE_ROBOT * pixel
+    for centre, radius in body:
+        plot.disc(centre, radius + (0.0 if large else 1.5 * pixel),
+                    palette.ROBOT if large else palette.FLOOR)
+    for centre, radius in body:
+        plot.disc(centre, radius - (2.5 * pixel if large else 0.0),
+                    palette.ROBOT_PALE if large else palette.ROBOT)
+    size = max(robot.radius, LEAST_ROBOT * pixel)
+    if large:
+        size = min(size, LARGE_ROBOT * pixel)
+        here = here + (robot.radius - 1.1 * size) * ahead
     aside = np.array([-ahead[1], ahead[0]])
     nose = np.stack([0.75 * ahead, -0.45 * ahead + 0.45 * aside, -0.2 * ahead,
                      -0.45 * ahead - 0.45 * aside])
-    canvas.fill(here + length * nose, palette.FLOOR)
+    plot.fill(here + size * nose, palette.ROBOT if large else palette.FLOOR)
 
 
-def _draw_tree(record: CycleRecord, canvas: Canvas) -> None:
-    tree = record.tree
-    if tree is not None:
-        canvas.lines(tree.rejected, palette.UNSAFE, 1)
-        nodes = [n for n in range(tree.count) if tree.parent[n] >= 0]
-        canvas.lines([tree.primitive(n) for n in nodes if not tree.braking[n]], palette.SAFE, 1)
-        canvas.lines([tree.primitive(n) for n in nodes if tree.braking[n]], palette.BRAKING, 2)
-    canvas.lines(record.particles, palette.PARTICLE, 1)
-
-
-def _draw_choice(moment: Moment, canvas: Canvas) -> None:
+def _draw_choice(moment: Moment, plot: Plot) -> None:
     chosen = moment.record.chosen
     if chosen is None:
         return
     start = chosen.states[0, :2]
     if np.hypot(*(start - moment.state[:2])) > 0.5 * moment.robot.radius:
         # where the plan begins, one cycle from now: the grey disc of Fig. 10
-        canvas.disc(start, moment.robot.radius, palette.MUTED, width=1)
-    canvas.line(chosen.states[:, :2], palette.CHOICE, 4)
+        plot.disc(start, moment.robot.radius, palette.MUTED, width=1)
+    plot.line(chosen.states[:, :2], palette.CHOICE, 4)
 
 
-def _region(moment: Moment, canvas: Canvas, count: int) -> Region | None:
+def _region(moment: Moment, bounds: Bounds, count: int) -> Region | None:
     """The region for the state in which the plan begins; at rest: for the plan's top speed."""
     model, chosen = moment.record.model, moment.record.chosen
     if model is None or count <= 0:
@@ -161,7 +193,7 @@ def _region(moment: Moment, canvas: Canvas, count: int) -> Region | None:
         speed = float(speeds[np.argmax(np.abs(speeds))])
     if abs(speed) < 1e-3:
         return None
-    return braking_ics(model, canvas.bounds, float(root[2]), speed, time, count)
+    return braking_ics(model, bounds, float(root[2]), speed, time, count)
 
 
 def _readings(moment: Moment) -> list[Reading]:
@@ -179,10 +211,6 @@ def _readings(moment: Moment) -> list[Reading]:
         Reading("contacts while moving", str(moment.contacts_moving), moment.contacts_moving > 0),
         Reading("contacts at rest", str(moment.contacts_at_rest)),
     ]
-
-
-def _note(moment: Moment) -> str:
-    return moment.record.lost_scan or moment.record.reason
 
 
 def _legend(region: Region | None) -> list[Entry]:
