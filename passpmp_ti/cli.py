@@ -100,7 +100,7 @@ def _map(given: argparse.Namespace) -> int:
     scenario = _scenario(given)
     from passpmp_ti.viz.outcome import write_png
     from passpmp_ti.viz.region_map import draw_region_map, region_map
-    from passpmp_ti.viz.report import table
+    from passpmp_ti.viz.report import map_report
 
     _start()
     heading = None if given.heading is None else math.radians(given.heading)
@@ -108,13 +108,7 @@ def _map(given: argparse.Namespace) -> int:
     path = Path(given.out)
     path.parent.mkdir(parents=True, exist_ok=True)
     write_png(path, draw_region_map(found))
-    print(f"{scenario.name}: p-safe states at {given.speed:g} m/s, heading"
-          f" {math.degrees(found.region.heading):.0f} deg, objects of at most"
-          f" {scenario.settings.object_speed:g} m/s")
-    shares = (("of the view", found.share_of_view),
-              ("within the scan's range", found.share_in_range),
-              ("of what the scan saw", found.share_of_seen))
-    print(table([(name, f"{100 * share:.1f}", "%") for name, share in shares]))
+    print(map_report(found))
     print(f"picture: {path}")
     return 0
 
@@ -122,22 +116,11 @@ def _map(given: argparse.Namespace) -> int:
 def _bench_cycle(given: argparse.Namespace) -> int:
     scenario = _scenario(given)
     from passpmp_ti.bench.cycle import measure_cycle
-    from passpmp_ti.viz.report import table
+    from passpmp_ti.viz.report import cycle_report
 
     _start()
     found = measure_cycle(scenario, given.cycles, given.seed)
-    print(f"{found['scenario']}: {found['cycles']} cycles, objects of at most"
-          f" {found['object_speed']:g} m/s, {found['particles']} particles, trees of"
-          f" {found['tree_nodes_median']:.0f} nodes (most: {found['tree_nodes_most']})")
-    print(f"{found['machine']}, {found['cores']} cores, backend {found['backend']},"
-          f" Python {found['python']}, Taichi {found['taichi']}, NumPy {found['numpy']}\n")
-    rows: list[tuple[str, ...]] = [("[ms]", "median", "99 %", "worst")]
-    for name, spread in found["seconds"].items():
-        label = "scan to trajectory" if name == "total" else f"  {name}"
-        rows.append((label, *(f"{1e3 * spread[k]:.2f}" for k in ("median", "p99", "worst"))))
-    print(table(rows))
-    print(f"\nmedian / the paper's {1e3 * found['paper_seconds']:.0f} ms (Table VII, another"
-          f" machine): {found['share_of_paper']:.2f}")
+    print(cycle_report(found))
     if given.json:
         Path(given.json).write_text(json.dumps(found, indent=2) + "\n")
     return 0

@@ -64,11 +64,15 @@ def test_ticks_are_round_numbers():
 
 def test_a_grid_is_painted_where_it_lies():
     canvas = Canvas((0.0, 0.0, 10.0, 10.0))
-    canvas.region(np.array([[False, True], [False, False]]), (2.0, 4.0), 2.0, palette.ICS)
-    x, y = canvas.pixels(np.array([5.0, 5.0]))
-    inside = has(canvas.sheet, palette.ICS)
-    assert inside[round(y), round(x)]
-    assert inside.sum() == pytest.approx((2 * canvas.scale) ** 2, rel=0.15)
+    cells = np.zeros((8, 8), dtype=bool)
+    cells[4:8, 0:4] = True  # rows upwards: 2 m by 2 m, its lowest corner at (2, 6)
+    canvas.region(cells, (2.0, 4.0), 0.5, palette.ICS)
+    painted = has(canvas.sheet, palette.ICS)
+    for point, inside in (((3.0, 7.0), True), ((2.1, 6.5), True), ((1.9, 7.0), False),
+                          ((3.0, 5.9), False), ((4.1, 7.0), False)):
+        column, row = canvas.pixels(np.array(point)).round().astype(int)
+        assert painted[row, column] == inside
+    assert painted.sum() == pytest.approx((2 * canvas.scale) ** 2, rel=0.05)
 
 
 def test_a_cycle_is_drawn_in_the_papers_colours(cycle):

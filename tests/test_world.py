@@ -87,10 +87,11 @@ def test_a_person_first_seen_inside_comes_from_the_edge_at_the_first_velocity():
     assert movers.top_speed == 2.0
 
 
-def test_a_person_who_stands_when_first_seen_stood_there_from_the_beginning():
-    movers = recorded_movers([walker((10, 5, 5), (11, 5, 5), (12, 6, 5))], EDGE, NO_WALLS)
-    assert movers.present(-1e6)[0]
-    assert movers.at(-1e6).tolist() == [[5, 5]]
+def test_a_person_who_stands_when_first_seen_came_earlier_by_the_shortest_way():
+    movers = recorded_movers([walker((100, 15, 0), (101, 15, 0), (102, 16, 0))], EDGE, NO_WALLS)
+    assert movers.at(80.0).tolist() == [[15, 0]]  # stood for twenty seconds before
+    assert movers.born[0] == pytest.approx(80 - 5 / 1.2)  # the edge is five metres away
+    assert movers.at(movers.born[0])[0] == pytest.approx([20, 0])
 
 
 def test_no_extension_passes_a_wall_and_whoever_can_turns_through_the_door():

@@ -52,7 +52,8 @@ def grow_level(
     kind: ti.template(),
     arrival: Arrival,  # [J, I]
     guide: ti.types.ndarray(dtype=ti.f32, ndim=2),
-    guide_frame: Numbers,  # [8]
+    ahead: ti.types.ndarray(dtype=ti.f32, ndim=3),
+    guide_frame: Numbers,  # [10]
     numbers: Numbers,  # [16]
     counts: Counts,  # [8]
     braking: Table,  # [B, 3]
@@ -103,14 +104,14 @@ def grow_level(
                         span = pace
                         if (k + 1) % pace != 0:
                             span = steps % pace
-                        spent += guide_at(guide, guide_frame, q[X], q[Y], q[C], q[S]) * span * numbers[1]
+                        spent += guide_at(guide, ahead, guide_frame, q[X], q[Y], q[C], q[S]) * span * numbers[1]
             if clear:
                 proof = proving_brake(
                     kind, arrival, numbers, counts, braking, robot, q, tick
                 )
                 store_pose(child_pose, m, q)
                 child_cost[m, 0] = cost[parent, 0] + spent
-                child_cost[m, 1] = guide_at(guide, guide_frame, q[X], q[Y], q[C], q[S])
+                child_cost[m, 1] = guide_at(guide, ahead, guide_frame, q[X], q[Y], q[C], q[S])
         child_proof[m] = proof
 
     # Slots are given in order, by one thread: the same tree on every run.
@@ -167,8 +168,8 @@ def grow_level(
                 q = step(kind, robot, q, control, 0.0, numbers[1])
                 taken += 1
                 if taken % 5 == 0:
-                    spent += guide_at(guide, guide_frame, q[X], q[Y], q[C], q[S]) * 5 * numbers[1]
-            spent += guide_at(guide, guide_frame, q[X], q[Y], q[C], q[S]) * (taken % 5) * numbers[1]
+                    spent += guide_at(guide, ahead, guide_frame, q[X], q[Y], q[C], q[S]) * 5 * numbers[1]
+            spent += guide_at(guide, ahead, guide_frame, q[X], q[Y], q[C], q[S]) * (taken % 5) * numbers[1]
             store_pose(pose, slot, q)
             link[slot, PARENT] = parent
             link[slot, CONTROL] = link[parent, PROOF]
@@ -179,4 +180,4 @@ def grow_level(
             link[slot, CHILDREN] = 0
             link[slot, WHAT] = BRAKED
             cost[slot, 0] = cost[parent, 0] + spent
-            cost[slot, 1] = guide_at(guide, guide_frame, q[X], q[Y], q[C], q[S])
+            cost[slot, 1] = guide_at(guide, ahead, guide_frame, q[X], q[Y], q[C], q[S])

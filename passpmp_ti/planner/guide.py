@@ -10,7 +10,7 @@ import numpy as np
 from passpmp_ti.grid.distance import distance_to_zeros
 from passpmp_ti.grid.model import FutureModel
 from passpmp_ti.grid.static_map import StaticMap
-from passpmp_ti.kernels.guide import UNREACHED, guide_costs, sweep
+from passpmp_ti.kernels.guide import UNREACHED, guide_costs, point_ahead, sweep
 from passpmp_ti.robots import Robot
 from passpmp_ti.settings import Settings
 
@@ -21,6 +21,10 @@ SLOWEST_SHARE = 1 / 12
 WALL_SHARE = 1 / 300
 """Of the cruise speed, inside walls: finite, so that every place has a way down."""
 MOST_ROUNDS = 12
+AROUND = 48
+"""Cells about the robot in which the way ahead is worked out."""
+AHEAD = 10
+"""Cells down the field at which the way ahead is read."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,8 +33,10 @@ class GuideField:
 
     time: np.ndarray
     """[J, I] float32: seconds to the goal from each cell's centre."""
+    ahead: np.ndarray
+    """[j, i, 2] float32: unit vectors along the way down, about the robot."""
     frame: np.ndarray
-    """[8] float32, see kernels/guide.py."""
+    """[10] float32, see kernels/guide.py."""
     anchor: tuple[float, float]
 
     def at(self, states: np.ndarray) -> np.ndarray:
@@ -41,7 +47,7 @@ class GuideField:
             places[:, :2] = states[:, :2] - np.array(self.anchor)
             places[:, 2] = np.cos(states[:, 2])
             places[:, 3] = np.sin(states[:, 2])
-            guide_costs(self.time, self.frame, places, cost)
+            guide_costs(self.time, self.ahead, self.frame, places, cost)
         return cost.astype(np.float64)
 
 
@@ -71,9 +77,11 @@ class Guide:
         if static_map is not None:
             self._mark(self._walls, _map_points(static_map) - np.array(anchor))
 
-    def field(self, model: FutureModel, goal: tuple[float, float]) -> GuideField:
-        """The cost to go to `goal`, given what this cycle's model shows."""
-        frame = np.zeros(8, dtype=np.float32)
+    def field(
+        self, model: FutureModel, goal: tuple[float, float], position: np.ndarray
+    ) -> GuideField:
+        """The cost to go to `goal`, given what this cycle's model shows from `position` [2]."""
+        frame = np.zeros(10, dtype=np.float32)
         local_goal = np.array(goal) - np.array(self._anchor)
         frame[:2] = self._low
         frame[2] = 1 / self._cell
@@ -83,7 +91,8 @@ class Guide:
         frame[7] = self._settings.weight_turn * self._robot.turn_time
         if self._settings.guide == "euclidean":
             frame[5] = 1
-            return GuideField(np.zeros((2, 2), dtype=np.float32), frame, self._anchor)
+            nothing = np.zeros((2, 2, 2), dtype=np.float32)
+            return GuideField(nothing[0], nothing, frame, self._anchor)
         self._mark(self._walls, _centres(model, model.static) - np.array(self._anchor))
         time = np.full(self._walls.shape, UNREACHED, dtype=np.float32)
         rows, columns = time.shape
@@ -91,7 +100,14 @@ class Guide:
         i = int(np.clip((local_goal[0] - self._low[0]) / self._cell, 0, columns - 1))
         time[j, i] = 0.0
         sweep((self._cell / self._speed(model)).astype(np.float32), MOST_ROUNDS, time)
-        return GuideField(time, frame, self._anchor)
+        here = (np.asarray(position) - np.array(self._anchor) - self._low) / self._cell
+        low = np.clip(np.floor(here - AROUND), 0, None).astype(int)
+        high = np.minimum(np.ceil(here + AROUND), (columns, rows)).astype(int)
+        frame[8:10] = low
+        ahead = np.zeros((*np.maximum(high - low, 1)[::-1], 2), dtype=np.float32)
+        if (high > low).all():
+            point_ahead(time, AHEAD, int(low[1]), int(low[0]), ahead)
+        return GuideField(time, ahead, frame, self._anchor)
 
     def _speed(self, model: FutureModel) -> np.ndarray:
         """[J, I] speed that will be safe at each place [m/s].

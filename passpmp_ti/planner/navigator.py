@@ -29,8 +29,9 @@ from passpmp_ti.scan import Scan
 from passpmp_ti.settings import Settings
 from passpmp_ti.trajectory import Trajectory
 
-TIE = 1e-4
-"""A new plan must be better than the held one by more than this share: the held one wins ties."""
+TIE = 1e-5
+"""A new plan must cost less than the held one by more than this: the held one wins ties. Small
+against the least progress worth having, since a cost to go of a minute is no reason to stand."""
 COAST = 4.0
 """How far ahead the decision time looks [s]."""
 COAST_PACE = 0.1
@@ -191,7 +192,7 @@ class Navigator:
         decision, reason = "held", "no safe plan was found"
         if leaf != ROOT:
             decision, reason = "held", "the held plan is at least as good"
-            if cost_new < cost_held - TIE * abs(cost_held):
+            if cost_new < cost_held - TIE:
                 plan = trajectory_to(tree, leaf)
                 if still_clear(model, plan):
                     self.held, decision, reason = plan, "new", ""
@@ -240,7 +241,7 @@ class Navigator:
                 self.robot, self.settings, (float(state[0]), float(state[1])), self.goals,
                 model.window.anchor, model.window.inner_radius, self.static_map,
             )  # fmt: skip
-        return self._guide.field(model, self.goal)
+        return self._guide.field(model, self.goal, state[:2])
 
     def _choose(self, tree: Tree) -> tuple[int, tuple[int, ...], float]:
         """(leaf, distinct leaves of the particles, its cost); the root where nothing grew."""

@@ -211,7 +211,7 @@ class TreeGrower:
                 stopped_by = "time"
                 break
             grow_level(
-                body.kind, model.ticks, guide.time, guide.frame, body.numbers, counts,
+                body.kind, model.ticks, guide.time, guide.ahead, guide.frame, body.numbers, counts,
                 body.braking, body.controls, first, last, steps, self._pose, self._link,
                 self._cost, self._child_pose, self._child_proof, self._child_cost, grown,
             )  # fmt: skip

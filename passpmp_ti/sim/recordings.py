@@ -15,6 +15,10 @@ from passpmp_ti.sim.world import Bounds
 
 FORMATS = ("obsmat", "frame_id_x_y")
 STANDING = 0.05  # slower than this a person stands [m/s]
+LINGER = 20.0  # those seen standing stand this much longer than was recorded [s]: not for ever, or
+# everybody who ever paused, most for seconds, would be a statue all through the recording
+PACE = 1.2  # at which they come and go [m/s]
+TURN = np.radians(7.5)  # between the headings that they may take [rad]
 # Headings that are tried in turn [rad]: straight on first, then the least turn that leads out. A
 # recording ends a step or two before a doorway, and the last step seldom aims through it.
 TURNS = np.radians([0, *(sign * angle for angle in range(3, 100, 3) for sign in (1, -1))])
@@ -78,7 +82,8 @@ def recorded_movers(
 
     Before its first and after its last sample each walks on at its own first or last velocity to
     the edge. Where a wall is in the way, the heading is turned by the least angle that leads out
-    (the speed stays); one who stands, or has no way out, stands there all the time.
+    (the speed stays). One who stands there has stood, or goes on standing, for twenty seconds and
+    walks the shortest way to the edge; one who has no way out stands there all the time.
 
     Args:
         tracks: per person [n, 3] rows t, x, y, n >= 2 [s, m, m].
@@ -102,27 +107,40 @@ def recorded_movers(
 def _extension(
     last: np.ndarray, step: np.ndarray, edge: Bounds, walls: np.ndarray, radius: float
 ) -> tuple[np.ndarray, float]:
-    """Rows to add beyond `last` (none or one), and the time from which the person is not there."""
+    """Rows t, x, y to add beyond `last`, and the time from which the person is not there."""
     sign = np.sign(step[0])
     velocity = step[1:] / abs(step[0])
-    speed = float(np.hypot(*velocity))
-    forever = sign * np.inf
-    inside = edge[0] < last[1] < edge[2] and edge[1] < last[2] < edge[3]
-    if not inside:
+    if not (edge[0] < last[1] < edge[2] and edge[1] < last[2] < edge[3]):
         return np.zeros((0, 3)), float(last[0])
-    if speed < STANDING:
-        return np.zeros((0, 3)), forever
-    for turn in TURNS:
-        c, s = np.cos(turn), np.sin(turn)
-        turned = np.array([c * velocity[0] - s * velocity[1], s * velocity[0] + c * velocity[1]])
-        to_edge = min(
-            ((edge[axis + 2] if v > 0 else edge[axis]) - last[1 + axis]) / v
-            for axis, v in enumerate(turned) if abs(v) > 1e-9
+    rows = []
+    if np.hypot(*velocity) < STANDING:
+        rows.append(last + (sign * LINGER, 0.0, 0.0))
+        ways = sorted(
+            (PACE * np.array([np.cos(a), np.sin(a)]) for a in np.arange(0.0, 2 * np.pi, TURN)),
+            key=lambda way: _time_to_edge(last[1:], way, edge),
         )
-        if _way_is_clear(last[1:], turned, to_edge, walls, radius):
-            row = np.array([last[0] + sign * to_edge, *(last[1:] + turned * to_edge)])
-            return row[None], float(row[0])
-    return np.zeros((0, 3)), forever
+    else:
+        ways = [_turned(velocity, turn) for turn in TURNS]
+    begin = rows[-1] if rows else last
+    for way in ways:
+        time = _time_to_edge(begin[1:], way, edge)
+        if _way_is_clear(begin[1:], way, time, walls, radius):
+            rows.append(np.array([begin[0] + sign * time, *(begin[1:] + way * time)]))
+            return np.array(rows)[:: int(sign)], float(rows[-1][0])
+    return np.zeros((0, 3)), sign * np.inf
+
+
+def _turned(velocity: np.ndarray, turn: float) -> np.ndarray:
+    c, s = np.cos(turn), np.sin(turn)
+    return np.array([c * velocity[0] - s * velocity[1], s * velocity[0] + c * velocity[1]])
+
+
+def _time_to_edge(place: np.ndarray, velocity: np.ndarray, edge: Bounds) -> float:
+    """How long a point inside the edge takes to it [s]."""
+    return min(
+        ((edge[axis + 2] if v > 0 else edge[axis]) - place[axis]) / v
+        for axis, v in enumerate(velocity) if abs(v) > 1e-9
+    )
 
 
 def _way_is_clear(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
     from passpmp_ti.sim.episode import CycleInfo, Episode
 
 SNAPSHOTS = 6
-FINE, COARSE = 40_000, 8_000
+FINE, COARSE = 40_000, 20_000
 """States of the braking-ICS region in a snapshot and in a frame of the video."""
 LEAST_FPS, MOST_FPS = 10, 60
 
@@ -45,7 +46,7 @@ class Outcome:
         self._with_video = video
         self._canvas: Canvas | None = None
         self._writer: VideoWriter | None = None
-        self._repeat = 1
+        self._frames = 1  # of the video, a cycle
         self._trail: list[np.ndarray] = []
         self._count = 0
         self._stride = 1
@@ -65,10 +66,21 @@ class Outcome:
             if chosen:
                 self._keep(moment.time, image)
             if self._writer is not None:
-                for _ in range(self._repeat):
-                    self._writer.write(image)
+                self._writer.write(image)
+                self._write_between(info, moment)
         self._last = moment
         self._count += 1
+
+    def _write_between(self, info: CycleInfo, moment: Moment) -> None:
+        """Frames until the next cycle, where cycles are long: all moves on, the plan stays."""
+        assert self._canvas is not None
+        assert self._writer is not None
+        ahead = info.navigator.settings.cycle * np.arange(1, self._frames) / self._frames
+        states = info.executing.sampled(info.time + ahead)
+        for n, state in enumerate(states):
+            trail = np.concatenate([moment.trail, states[: n + 1, :2]])
+            between = replace(moment, time=info.time + float(ahead[n]), state=state, trail=trail)
+            self._writer.write(draw_cycle(between, self._canvas, region_states=COARSE))
 
     def finish(self, episode: Episode) -> dict[str, Any]:
         """Write `summary.json` and `episode.npz`; returns the summary."""
@@ -102,8 +114,8 @@ class Outcome:
         self._canvas.title(self._heading, self._detail)
         if self._with_video:
             cycle = info.navigator.settings.cycle
-            self._repeat = math.ceil(cycle * LEAST_FPS - 1e-9)
-            fps = min(self._repeat / cycle, MOST_FPS)
+            self._frames = math.ceil(cycle * LEAST_FPS - 1e-9)
+            fps = min(self._frames / cycle, MOST_FPS)
             self._writer = VideoWriter(self.folder / "video.mp4", self._canvas.layout.page, fps)
 
     def _keep(self, time: float, image: np.ndarray) -> None:

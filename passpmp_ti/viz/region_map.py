@@ -10,10 +10,10 @@ from passpmp_ti.grid.model import FutureModel
 from passpmp_ti.sim.scenario import Scenario
 from passpmp_ti.sim.world import World
 from passpmp_ti.viz import palette, panel
+from passpmp_ti.viz.actors import draw_robot, draw_world, shade_unseen
 from passpmp_ti.viz.canvas import Canvas
 from passpmp_ti.viz.panel import Entry, Reading
 from passpmp_ti.viz.region import Region, braking_ics
-from passpmp_ti.viz.scene import draw_robot, draw_world, shade_unseen
 
 STATES = 160_000
 LEGEND = (

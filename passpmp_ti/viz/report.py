@@ -9,6 +9,7 @@ from typing import IO, TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from passpmp_ti.sim.episode import CycleInfo
+    from passpmp_ti.viz.region_map import RegionMap
 
 SPARSE = 5.0
 """Simulated seconds between lines where the output is not a terminal."""
@@ -85,6 +86,38 @@ def summary_table(summaries: list[Mapping[str, Any]]) -> str:
         told = [_told(summary.get(key), factor, digits) for _, key, _, factor, digits in ROWS]
         columns.append([str(summary["seed"]), *told])
     return table(list(zip(*columns, strict=True)), left=2)
+
+
+def map_report(found: RegionMap) -> str:
+    """The p-safe shares of a map."""
+    region = found.region
+    shares = (("of the view", found.share_of_view),
+              ("within the scan's range", found.share_in_range),
+              ("of what the scan saw", found.share_of_seen))
+    return (
+        f"{found.scenario.name}: p-safe states at {region.speed:g} m/s, heading"
+        f" {math.degrees(region.heading):.0f} deg, objects of at most"
+        f" {found.scenario.settings.object_speed:g} m/s\n"
+        + table([(name, f"{100 * share:.1f}", "%") for name, share in shares])
+    )
+
+
+def cycle_report(found: Mapping[str, Any]) -> str:
+    """What `measure_cycle` found, in milliseconds."""
+    rows = [["[ms]", "median", "99 %", "worst"]]
+    for name, spread in found["seconds"].items():
+        label = "scan to trajectory" if name == "total" else f"  {name}"
+        rows.append([label, *(f"{1e3 * spread[k]:.2f}" for k in ("median", "p99", "worst"))])
+    return (
+        f"{found['scenario']}: {found['cycles']} cycles, objects of at most"
+        f" {found['object_speed']:g} m/s, {found['particles']} particles, trees of"
+        f" {found['tree_nodes_median']:.0f} nodes (most: {found['tree_nodes_most']})\n"
+        f"{found['machine']}, {found['cores']} cores, backend {found['backend']},"
+        f" Python {found['python']}, Taichi {found['taichi']}, NumPy {found['numpy']}\n\n"
+        f"{table(rows)}\n\n"
+        f"median / the paper's {1e3 * found['paper_seconds']:.0f} ms (Table VII, another"
+        f" machine): {found['share_of_paper']:.2f}"
+    )
 
 
 def table(rows: Iterable[Iterable[str]], left: int = 1) -> str:

@@ -11,6 +11,7 @@ import numpy as np
 from passpmp_ti.planner.record import CycleRecord
 from passpmp_ti.robots import Robot
 from passpmp_ti.viz import palette, panel
+from passpmp_ti.viz.actors import draw_body, draw_outline, draw_world, shade_unseen
 from passpmp_ti.viz.branches import Branches, branches_of
 from passpmp_ti.viz.canvas import Canvas
 from passpmp_ti.viz.panel import Entry, Reading
@@ -18,15 +19,10 @@ from passpmp_ti.viz.plot import Bounds, Plot
 from passpmp_ti.viz.region import Region, braking_ics
 
 if TYPE_CHECKING:
-    from passpmp_ti.grid.model import FutureModel
     from passpmp_ti.sim.world import World
 
-TAIL, TAIL_POINTS = 1.2, 9
-"""Length of the trail of a moving object [s]."""
 MAGNIFY, LEAST_CLOSE_UP = 2.5, 150
 """How much larger the close-up is, and its least side [px]."""
-LEAST_ROBOT, LARGE_ROBOT = 5.0, 14.0
-"""The robot is drawn at least this large, and pale from there on [px]."""
 DECISIONS = {"new": "new plan", "held": "plan held", "brake": "braking", "arrived": "arrived"}
 
 ENTRIES = (
@@ -103,7 +99,7 @@ def _paint(moment: Moment, plot: Plot, region: Region | None, branches: Branches
         shade_unseen(moment.record.model, plot)
     draw_world(moment.world, moment.time, plot)
     plot.line(moment.trail, palette.EXECUTED, 3)
-    draw_robot(moment.robot, moment.state, plot)
+    draw_body(moment.robot, moment.state, plot)
     if branches is not None and moment.record.tree is not None:
         plot.lines(branches.rejected, palette.UNSAFE, 1)
         plot.lines(branches.safe, palette.SAFE, 1)
@@ -111,6 +107,7 @@ def _paint(moment: Moment, plot: Plot, region: Region | None, branches: Branches
         leaves = moment.record.particle_leaves
         plot.lines(branches.through(moment.record.tree, leaves), palette.PARTICLE, 1)
     _draw_choice(moment, plot)
+    draw_outline(moment.robot, moment.state, plot)
     for goal in moment.goals:
         plot.dot(np.asarray(goal), 5, palette.GOAL)
     plot.star(np.asarray(moment.record.goal), 11, palette.GOAL)
@@ -122,51 +119,6 @@ def _bounds_near(moment: Moment, half: float) -> Bounds:
     ahead = 0.7 * half * float(moment.robot.speed(moment.state)) / moment.robot.top_speed
     x, y = x + ahead * math.cos(theta), y + ahead * math.sin(theta)
     return (x - half, y - half, x + half, y + half)
-
-
-def shade_unseen(model: FutureModel, plot: Plot) -> None:
-    """Hatch what the scan did not see and memory does not know to be free."""
-    known = model.seen | (model.ticks > model.ticks_of(model.stamp))
-    plot.shade(~plot.sampled(known, model.origin, model.cell))
-
-
-def draw_world(world: World, time: float, plot: Plot) -> None:
-    """The things that stay, and those that move at `time` [s] with where they came from."""
-    for polygon in world.polygons:
-        plot.fill(polygon, palette.STATIC)
-    plot.lines(world.segments.reshape(-1, 2, 2), palette.STATIC, 2)
-    movers = world.movers
-    present = movers.present(time)
-    if not np.any(present):
-        return
-    tails = np.stack([movers.at(time - TAIL * s) for s in np.linspace(1, 0, TAIL_POINTS)], axis=1)
-    plot.lines(tails[present], palette.TRAIL, 3)
-    for centre, radius in zip(movers.at(time)[present], movers.radius[present], strict=True):
-        plot.disc(centre, float(radius), palette.MOVER)
-
-
-def draw_robot(robot: Robot, state: np.ndarray, plot: Plot) -> None:
-    """The robot's body with a mark towards its front; a large one pale, for what lies over it."""
-    here = state[:2]
-    ahead = np.array([math.cos(state[2]), math.sin(state[2])])
-    pixel = 1.0 / plot.scale
-    body = [(here + offset * ahead, max(radius, LEAST_ROBOT * pixel))
-            for offset, radius in robot.discs]
-    large = robot.radius > LARGE_ROBOT * pixel
-    for centre, radius in body:
-        plot.disc(centre, radius + (0.0 if large else 1.5 * pixel),
-                    palette.ROBOT if large else palette.FLOOR)
-    for centre, radius in body:
-        plot.disc(centre, radius - (2.5 * pixel if large else 0.0),
-                    palette.ROBOT_PALE if large else palette.ROBOT)
-    size = max(robot.radius, LEAST_ROBOT * pixel)
-    if large:
-        size = min(size, LARGE_ROBOT * pixel)
-        here = here + (robot.radius - 1.1 * size) * ahead
-    aside = np.array([-ahead[1], ahead[0]])
-    nose = np.stack([0.75 * ahead, -0.45 * ahead + 0.45 * aside, -0.2 * ahead,
-                     -0.45 * ahead - 0.45 * aside])
-    plot.fill(here + size * nose, palette.ROBOT if large else palette.FLOOR)
 
 
 def _draw_choice(moment: Moment, plot: Plot) -> None:
