@@ -63,15 +63,18 @@ def _run(given: argparse.Namespace) -> int:
         print(f"\n{scenario.name}: {scenario.description}")
         print(summary_table(summaries))
     if interrupted:
-        print(f"passpmp: interrupted; {len(summaries)} of {len(seeds)} runs ended by themselves",
-              file=sys.stderr)
+        print(
+            f"passpmp: interrupted; {len(summaries)} of {len(seeds)} runs ended by themselves",
+            file=sys.stderr,
+        )
     if given.out:
         print(f"\nwritten to {given.out}")
     return INTERRUPTED if interrupted else 0
 
 
-def _drive(scenario: Scenario, seed: int, progress: Progress, out: Path | None,
-           video: bool) -> Mapping[str, Any]:
+def _drive(
+    scenario: Scenario, seed: int, progress: Progress, out: Path | None, video: bool
+) -> Mapping[str, Any]:
     """One episode, watched; what was seen is written even if it is cut short."""
     from passpmp_ti.sim.episode import simulate
 
@@ -81,8 +84,7 @@ def _drive(scenario: Scenario, seed: int, progress: Progress, out: Path | None,
     from passpmp_ti.viz.outcome import Outcome
 
     settings = scenario.settings
-    detail = (f"seed {seed} · objects ≤ {settings.object_speed:.3g} m/s"
-              f" · cycle {settings.cycle:g} s")
+    detail = f"seed {seed} · objects ≤ {settings.object_speed:.3g} m/s · cycle {settings.cycle:g} s"
     with Outcome(out, scenario.name, detail, video=video) as outcome:
         episode = simulate(scenario, seed=seed, on_cycle=_both(progress, outcome))
         return outcome.finish(episode)
@@ -185,51 +187,92 @@ def _seeds(text: str) -> list[int]:
 
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
-        prog="passpmp", formatter_class=argparse.RawDescriptionHelpFormatter,
+        prog="passpmp",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
         description="Motion planning that is at rest before anything can hit the robot.",
         epilog="example:\n  passpmp run crowded --object-speed 5 --out out/crowded",
     )
     commands = parser.add_subparsers(required=True, metavar="command")
 
-    run = _command(commands, "run", "drive through a scenario", _run,
-                   "passpmp run crowded --object-speed 5 --seed 3 --out out/crowded")
+    run = _command(
+        commands,
+        "run",
+        "drive through a scenario",
+        _run,
+        "passpmp run crowded --object-speed 5 --seed 3 --out out/crowded",
+    )
     _scenario_options(run)
     run.add_argument("--seeds", type=_seeds, metavar="A-B", help="several seeds, one after another")
     run.add_argument("--out", metavar="DIR", help="leave video, snapshots, summary and arrays here")
     run.add_argument("--no-video", action="store_true", help="with --out: no video")
 
-    region = _command(commands, "map", "draw the braking-ICS region at a scenario's start", _map,
-                      "passpmp map crowded --speed 10 --heading 30 --out out/map.png")
+    region = _command(
+        commands,
+        "map",
+        "draw the braking-ICS region at a scenario's start",
+        _map,
+        "passpmp map crowded --speed 10 --heading 30 --out out/map.png",
+    )
     _scenario_options(region)
-    region.add_argument("--speed", type=float, required=True, metavar="V",
-                        help="of the states [m/s]")
-    region.add_argument("--heading", type=float, metavar="DEG",
-                        help="of the states [deg]; the robot's at its start if left out")
-    region.add_argument("--time", type=float, default=0.0, metavar="S",
-                        help="of the scan, after the start [s] (default: 0)")
-    region.add_argument("--out", default="map.png", metavar="FILE",
-                        help="picture (default: map.png)")
+    region.add_argument(
+        "--speed", type=float, required=True, metavar="V", help="of the states [m/s]"
+    )
+    region.add_argument(
+        "--heading",
+        type=float,
+        metavar="DEG",
+        help="of the states [deg]; the robot's at its start if left out",
+    )
+    region.add_argument(
+        "--time",
+        type=float,
+        default=0.0,
+        metavar="S",
+        help="of the scan, after the start [s] (default: 0)",
+    )
+    region.add_argument(
+        "--out", default="map.png", metavar="FILE", help="picture (default: map.png)"
+    )
 
-    bench = commands.add_parser("bench", help="measure", epilog="example:\n  passpmp bench cycle",
-                                formatter_class=argparse.RawDescriptionHelpFormatter)
+    bench = commands.add_parser(
+        "bench",
+        help="measure",
+        epilog="example:\n  passpmp bench cycle",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
     measures = bench.add_subparsers(required=True, metavar="measure")
-    cycle = _command(measures, "cycle", "time of a planning cycle, scan to trajectory",
-                     _bench_cycle, "passpmp bench cycle --cycles 200 --json cycle.json")
+    cycle = _command(
+        measures,
+        "cycle",
+        "time of a planning cycle, scan to trajectory",
+        _bench_cycle,
+        "passpmp bench cycle --cycles 200 --json cycle.json",
+    )
     _scenario_options(cycle, default="crowded")
-    cycle.add_argument("--cycles", type=int, default=1000, metavar="N",
-                       help="how many are measured (default: 1000)")
+    cycle.add_argument(
+        "--cycles",
+        type=int,
+        default=1000,
+        metavar="N",
+        help="how many are measured (default: 1000)",
+    )
     cycle.add_argument("--json", metavar="FILE", help="write the figures there")
 
-    _command(commands, "scenarios", "list the scenarios that come along", _scenarios,
-             "passpmp scenarios")
+    _command(
+        commands, "scenarios", "list the scenarios that come along", _scenarios, "passpmp scenarios"
+    )
     return parser
 
 
-def _command(commands: Any, name: str, what: str, action: Any,
-             example: str) -> argparse.ArgumentParser:
+def _command(
+    commands: Any, name: str, what: str, action: Any, example: str
+) -> argparse.ArgumentParser:
     parser: argparse.ArgumentParser = commands.add_parser(
-        name, help=what, description=what[0].upper() + what[1:] + ".",
-        epilog=f"example:\n  {example}", formatter_class=argparse.RawDescriptionHelpFormatter,
+        name,
+        help=what,
+        description=what[0].upper() + what[1:] + ".",
+        epilog=f"example:\n  {example}",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.set_defaults(action=action)
     return parser
@@ -239,15 +282,28 @@ def _scenario_options(parser: argparse.ArgumentParser, default: str | None = Non
     if default is None:
         parser.add_argument("scenario", help="a shipped name (see `passpmp scenarios`) or a file")
     else:
-        parser.add_argument("scenario", nargs="?", default=default,
-                            help=f"a shipped name or a file (default: {default})")
-    parser.add_argument("--seed", type=int, default=0, metavar="N",
-                        help="of movers, noise and planner (default: 0)")
-    parser.add_argument("--object-speed", type=float, metavar="V",
-                        help="bound on the speed of objects [m/s]; faster movers are slowed down")
+        parser.add_argument(
+            "scenario",
+            nargs="?",
+            default=default,
+            help=f"a shipped name or a file (default: {default})",
+        )
+    parser.add_argument(
+        "--seed", type=int, default=0, metavar="N", help="of movers, noise and planner (default: 0)"
+    )
+    parser.add_argument(
+        "--object-speed",
+        type=float,
+        metavar="V",
+        help="bound on the speed of objects [m/s]; faster movers are slowed down",
+    )
     parser.add_argument("--cycle", type=float, metavar="S", help="length of a planning cycle [s]")
-    parser.add_argument("--set", action="append", metavar="FIELD=VALUE",
-                        help="any other field of Settings; may be repeated")
+    parser.add_argument(
+        "--set",
+        action="append",
+        metavar="FIELD=VALUE",
+        help="any other field of Settings; may be repeated",
+    )
 
 
 if __name__ == "__main__":

@@ -9,8 +9,16 @@ from collections.abc import Iterable
 import numpy as np
 
 
-def finite(owner: str, name: str, value: object, *, above: float | None = None,
-           least: float | None = None, most: float | None = None, unit: str = "") -> float:
+def finite(
+    owner: str,
+    name: str,
+    value: object,
+    *,
+    above: float | None = None,
+    least: float | None = None,
+    most: float | None = None,
+    unit: str = "",
+) -> float:
     """Return `value` as a float, or refuse it.
 
     Args:
@@ -64,7 +72,8 @@ def choice(owner: str, name: str, value: object, allowed: Iterable[str]) -> str:
     if isinstance(value, str) and value in options:
         return value
     raise ValueError(
-        f"{owner}.{name} must be one of {', '.join(options)}; got {value!r}{nearest(value, options)}"
+        f"{owner}.{name} must be one of {', '.join(options)}; got {value!r}"
+        f"{nearest(value, options)}"
     )
 
 

@@ -87,7 +87,7 @@ class Settings:
     """w_d of eq. 5."""
     weight_time: float = 0.02
     """w_t of eq. 5."""
-    weight_turn: float = 0.3
+    weight_turn: float = 0.5
     """Share of the time to turn towards the way down that the guide adds; 0: places alone."""
     goal_tolerance: float = 0.3
     """The goal is reached at rest within this distance [m]."""
@@ -100,12 +100,30 @@ class Settings:
         door.choice(name, "optimizer", self.optimizer, OPTIMIZERS)
         door.choice(name, "guide", self.guide, GUIDES)
         door.choice(name, "distance", self.distance, DISTANCES)
-        for field_ in ("object_speed", "clear_radius", "tracking_error", "localisation_error",
-                       "range_noise", "stamp_error", "map_tolerance", "cognitive", "social",
-                       "weight_distance", "weight_time", "weight_turn"):
+        for field_ in (
+            "object_speed",
+            "clear_radius",
+            "tracking_error",
+            "localisation_error",
+            "range_noise",
+            "stamp_error",
+            "map_tolerance",
+            "cognitive",
+            "social",
+            "weight_distance",
+            "weight_time",
+            "weight_turn",
+        ):
             door.finite(name, field_, getattr(self, field_), least=0.0)
-        for field_ in ("object_width", "cell", "time_step", "layer_length", "cycle",
-                       "velocity_max", "goal_tolerance"):
+        for field_ in (
+            "object_width",
+            "cell",
+            "time_step",
+            "layer_length",
+            "cycle",
+            "velocity_max",
+            "goal_tolerance",
+        ):
             door.finite(name, field_, getattr(self, field_), above=0.0)
         for field_ in ("blind_speed", "exploration_time", "cruise_speed"):
             if getattr(self, field_) is not None:
@@ -117,8 +135,16 @@ class Settings:
             )
         if self.window is not None:
             door.whole(name, "window", self.window, least=16, most=8192)
-        for field_, most in (("capacity", 50_000_000), ("particles", 100_000),
-                             ("iterations", 100_000), ("sub_swarms", 10_000)):
+            if self.window % 16:
+                raise ValueError(
+                    f"Settings.window must be a multiple of 16 cells; got {self.window}"
+                )
+        for field_, most in (
+            ("capacity", 50_000_000),
+            ("particles", 100_000),
+            ("iterations", 100_000),
+            ("sub_swarms", 10_000),
+        ):
             door.whole(name, field_, getattr(self, field_), least=1, most=most)
         if self.particles % self.sub_swarms:
             raise ValueError(
@@ -154,13 +180,24 @@ class Settings:
         """
         if isinstance(robot, CarLike):
             own: dict[str, Any] = dict(
-                object_speed=20.0, object_width=0.8, cell=0.25, cycle=0.1,
-                primitives=(0.5, 1.0, 1.5), goal_tolerance=3.0, particles=100,
+                object_speed=20.0,
+                object_width=0.8,
+                cell=0.25,
+                cycle=0.1,
+                primitives=(0.5, 1.0, 1.5),
+                goal_tolerance=3.0,
+                particles=100,
             )
         else:
             own = dict(
-                object_speed=2.0, object_width=0.4, cell=0.05, cycle=0.1,
-                primitives=(0.4, 0.6, 1.0), goal_tolerance=0.3, particles=50, cruise_speed=1.5,
+                object_speed=2.0,
+                object_width=0.4,
+                cell=0.05,
+                cycle=0.1,
+                primitives=(0.4, 0.6, 1.0),
+                goal_tolerance=0.3,
+                particles=50,
+                cruise_speed=1.5,
             )
         return cls(**own).changed(**changes)
 

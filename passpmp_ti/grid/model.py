@@ -273,9 +273,7 @@ class FutureModel:
         return self.ticks_of(times)
 
 
-def _check_previous(
-    previous: FutureModel, robot: Robot, settings: Settings, stamp: float
-) -> None:
+def _check_previous(previous: FutureModel, robot: Robot, settings: Settings, stamp: float) -> None:
     owner = "FutureModel.from_scan.previous"
     if previous.stamp > stamp:
         raise ValueError(
@@ -329,9 +327,7 @@ def _empty_discs(
     return discs
 
 
-def _rasterise(
-    views: Views, window: Window, settings: Settings
-) -> tuple[np.ndarray, np.ndarray]:
+def _rasterise(views: Views, window: Window, settings: Settings) -> tuple[np.ndarray, np.ndarray]:
     seen = np.empty((window.size, window.size), dtype=np.uint8)
     marks = np.ones((5, window.size, window.size), dtype=np.uint8)
     i0, j0 = window.corner

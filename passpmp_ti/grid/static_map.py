@@ -91,8 +91,8 @@ class StaticMap:
             j = np.floor((np.linspace(y1, y2, count) - low[1]) / resolution).astype(int)
             occupied[j, i] = True
         drawn = cls(occupied, resolution, (float(low[0]), float(low[1]), 0.0))
-        return drawn if thickness == 0 else cls(
-            drawn.dilated(thickness / 2), resolution, drawn.origin
+        return (
+            drawn if thickness == 0 else cls(drawn.dilated(thickness / 2), resolution, drawn.origin)
         )
 
     def cells(self, points: np.ndarray) -> np.ndarray:
@@ -145,10 +145,15 @@ class StaticMap:
         """[n, 4] outline of the occupied cells as world line segments x1, y1, x2, y2 [m]."""
         across = _runs(self.occupied)  # (row edge, first column, last column)
         along = _runs(self.occupied.T)
-        own = np.concatenate([
-            np.stack([across[:, 1], across[:, 0], across[:, 2], across[:, 0]], axis=1),
-            np.stack([along[:, 0], along[:, 1], along[:, 0], along[:, 2]], axis=1),
-        ]) * self.resolution
+        own = (
+            np.concatenate(
+                [
+                    np.stack([across[:, 1], across[:, 0], across[:, 2], across[:, 0]], axis=1),
+                    np.stack([along[:, 0], along[:, 1], along[:, 0], along[:, 2]], axis=1),
+                ]
+            )
+            * self.resolution
+        )
         x, y, yaw = self.origin
         c, s = math.cos(yaw), math.sin(yaw)
         turn = np.array([[c, s], [-s, c]])

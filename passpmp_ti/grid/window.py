@@ -32,7 +32,8 @@ class Window:
         if anchor is None:
             anchor = (math.floor(x / cell) * cell, math.floor(y / cell) * cell)
         corner = tuple(
-            math.floor((p - a) / cell + 0.5) - size // 2 for p, a in zip((x, y), anchor, strict=True)
+            math.floor((p - a) / cell + 0.5) - size // 2
+            for p, a in zip((x, y), anchor, strict=True)
         )
         return cls(size, cell, (corner[0], corner[1]), anchor)
 

@@ -19,6 +19,8 @@ import taichi as ti
 
 LOST, NOTHING, MOVABLE, STATIC, STATIC_BY_MAP = -1, 0, 1, 2, 3
 """What a beam met."""
+DOUBTED = -4
+"""On its way from STATIC_BY_MAP to MOVABLE: it makes no other return doubted in turn."""
 
 SHUT, OPEN, STANDING, UNCOVERED = 0, 1, 2, 3
 """What a wedge's far side lets through: nothing, anything, anything from behind a standing thing,
@@ -74,7 +76,10 @@ def label_by_map(
     n = ranges.shape[0]
     for beam in range(n):
         if met[beam] == MOVABLE and mapped(
-            map_static, frame, end_x(view, v, beam, ranges[beam]), end_y(view, v, beam, ranges[beam])
+            map_static,
+            frame,
+            end_x(view, v, beam, ranges[beam]),
+            end_y(view, v, beam, ranges[beam]),
         ):
             met[beam] = STATIC_BY_MAP
     # Somebody who leans on a wall has returns within the map's tolerance of it: a return that is
@@ -92,9 +97,9 @@ def label_by_map(
                         dx = end_x(view, v, other, ranges[other]) - x
                         dy = end_y(view, v, other, ranges[other]) - y
                         if dx * dx + dy * dy < width * width:
-                            met[beam] = LOST - STATIC_BY_MAP  # marked, so that it spreads no further
+                            met[beam] = DOUBTED
     for beam in range(n):
-        if met[beam] == LOST - STATIC_BY_MAP:
+        if met[beam] == DOUBTED:
             met[beam] = MOVABLE
         if met[beam] == STATIC_BY_MAP:
             met[beam] = STATIC

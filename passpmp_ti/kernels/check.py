@@ -137,9 +137,7 @@ def check_states(
         q = pose7(0.0)
         for r in ti.static(range(7)):
             q[r] = poses[n, r]
-        proof[n] = proving_brake(
-            kind, arrival, numbers, counts, braking, robot, q, ticks[n]
-        )
+        proof[n] = proving_brake(kind, arrival, numbers, counts, braking, robot, q, ticks[n])
 
 
 @ti.kernel

@@ -104,11 +104,13 @@ def grow_level(
                         span = pace
                         if (k + 1) % pace != 0:
                             span = steps % pace
-                        spent += guide_at(guide, ahead, guide_frame, q[X], q[Y], q[C], q[S]) * span * numbers[1]
+                        spent += (
+                            guide_at(guide, ahead, guide_frame, q[X], q[Y], q[C], q[S])
+                            * span
+                            * numbers[1]
+                        )
             if clear:
-                proof = proving_brake(
-                    kind, arrival, numbers, counts, braking, robot, q, tick
-                )
+                proof = proving_brake(kind, arrival, numbers, counts, braking, robot, q, tick)
                 store_pose(child_pose, m, q)
                 child_cost[m, 0] = cost[parent, 0] + spent
                 child_cost[m, 1] = guide_at(guide, ahead, guide_frame, q[X], q[Y], q[C], q[S])
@@ -168,8 +170,14 @@ def grow_level(
                 q = step(kind, robot, q, control, 0.0, numbers[1])
                 taken += 1
                 if taken % 5 == 0:
-                    spent += guide_at(guide, ahead, guide_frame, q[X], q[Y], q[C], q[S]) * 5 * numbers[1]
-            spent += guide_at(guide, ahead, guide_frame, q[X], q[Y], q[C], q[S]) * (taken % 5) * numbers[1]
+                    spent += (
+                        guide_at(guide, ahead, guide_frame, q[X], q[Y], q[C], q[S]) * 5 * numbers[1]
+                    )
+            spent += (
+                guide_at(guide, ahead, guide_frame, q[X], q[Y], q[C], q[S])
+                * (taken % 5)
+                * numbers[1]
+            )
             store_pose(pose, slot, q)
             link[slot, PARENT] = parent
             link[slot, CONTROL] = link[parent, PROOF]

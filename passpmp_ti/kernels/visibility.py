@@ -10,6 +10,7 @@ import taichi as ti
 from passpmp_ti.kernels.beams import MOVABLE, OPEN, SHUT, SLACK, STANDING, STATIC, UNCOVERED
 
 TAU = 6.2831853
+BLOCK = 8  # cells along the side of a block that is first judged as a whole
 BEARING_SLACK = 2e-5  # [rad] f32 bearings must not fall into the wrong wedge
 
 Views = ti.types.ndarray(dtype=ti.f32, ndim=2)
@@ -29,25 +30,31 @@ def wedge_at(view: ti.template(), n, v, bearing):
 
 
 @ti.func
-def proves(view: ti.template(), n, reach: ti.template(), v, x, y, pad, far):
-    """Whether view v proves empty every bearing that a disc of radius `pad` spans, out to `far`."""
+def wedges_across(view: ti.template(), n, v, x, y, pad):
+    """(first wedge, count) that a disc of radius `pad` about (x, y) spans, as view v sees it."""
     dx = x - view[v, 0]
     dy = y - view[v, 1]
     r = ti.sqrt(dx * dx + dy * dy)
+    first = 0
+    count = n
+    if 2.0 * pad < r:
+        # asin(z) < 1.05 z up to z = 1/2: a wider span is a safer one
+        half = 1.05 * pad / r + BEARING_SLACK
+        bearing = ti.atan2(dy, dx)
+        first = wedge_at(view, n, v, bearing - half)
+        last = wedge_at(view, n, v, bearing + half)
+        count = last - first + 1
+        if count <= 0:
+            count += n
+    return first, count
+
+
+@ti.func
+def proves(view: ti.template(), n, reach: ti.template(), v, x, y, pad, far):
+    """Whether view v proves empty every bearing that a disc of radius `pad` spans, out to `far`."""
     ok = far <= view[v, 5]
     if ok:
-        half = TAU
-        if r > pad:
-            half = ti.asin(ti.min(pad / r, 1.0)) + BEARING_SLACK
-        first = 0
-        count = n
-        if half < 1.6:
-            bearing = ti.atan2(dy, dx)
-            first = wedge_at(view, n, v, bearing - half)
-            last = wedge_at(view, n, v, bearing + half)
-            count = last - first + 1
-            if count <= 0:
-                count += n
+        first, count = wedges_across(view, n, v, x, y, pad)
         k = 0
         while ok and k < count:
             w = first + k
@@ -105,15 +112,9 @@ def keeps_out(
     dx = x - view[v, 0]
     dy = y - view[v, 1]
     r = ti.sqrt(dx * dx + dy * dy)
-    ok = r > 2.0 * pad
-    if ok:
-        half = ti.asin(pad / r) + BEARING_SLACK
-        bearing = ti.atan2(dy, dx)
-        first = wedge_at(view, n, v, bearing - half)
-        last = wedge_at(view, n, v, bearing + half)
-        count = last - first + 1
-        if count <= 0:
-            count += n
+    ok = True
+    if r > 2.0 * pad:
+        first, count = wedges_across(view, n, v, x, y, pad)
         k = 0
         while ok and k < count:
             w = first + k
@@ -128,6 +129,31 @@ def keeps_out(
     return ok
 
 
+@ti.func
+def block_seen(view: ti.template(), beams: ti.template(), reach: ti.template(), x, y, radius):
+    """1: all of a disc is proven empty by one view; 0: none of it by any; -1: look closer."""
+    verdict = 0
+    for v in range(view.shape[0]):
+        dx = x - view[v, 0]
+        dy = y - view[v, 1]
+        r = ti.sqrt(dx * dx + dy * dy)
+        if verdict != 1 and r - radius <= view[v, 5]:
+            first, count = wedges_across(view, beams[v], v, x, y, radius)
+            least = view[v, 5]
+            most = 0.0
+            for k in range(count):
+                w = first + k
+                if w >= beams[v]:
+                    w -= beams[v]
+                least = ti.min(least, reach[v, w])
+                most = ti.max(most, reach[v, w])
+            if least >= r + radius:
+                verdict = 1
+            elif most >= r - radius:
+                verdict = -1
+    return verdict
+
+
 @ti.kernel
 def see_cells(
     # in
@@ -138,20 +164,32 @@ def see_cells(
     corner_j: ti.i32,
     cell: ti.f32,
     # out
-    seen: Cells,  # [J, I]: 1 = all of the cell proven empty
+    seen: Cells,  # [J, I], J and I multiples of BLOCK: 1 = all of the cell proven empty
 ):
-    for j, i in seen:
-        x = (corner_i + i + 0.5) * cell
-        y = (corner_j + j + 0.5) * cell
-        empty = False
-        for v in range(view.shape[0]):
-            if not empty:
-                fx = ti.abs(x - view[v, 0]) + 0.5 * cell
-                fy = ti.abs(y - view[v, 1]) + 0.5 * cell
-                far = ti.sqrt(fx * fx + fy * fy) + SLACK
-                if far <= view[v, 5]:
-                    empty = proves(view, beams[v], reach, v, x, y, 0.7071068 * cell, far)
-        seen[j, i] = ti.cast(empty, ti.u8)
+    columns = seen.shape[1] // BLOCK
+    for block in range((seen.shape[0] // BLOCK) * columns):
+        j0 = (block // columns) * BLOCK
+        i0 = (block % columns) * BLOCK
+        x0 = (corner_i + i0 + 0.5 * BLOCK) * cell
+        y0 = (corner_j + j0 + 0.5 * BLOCK) * cell
+        radius = 0.7071068 * BLOCK * cell + SLACK
+        verdict = block_seen(view, beams, reach, x0, y0, radius)
+        for dj in range(BLOCK):
+            for di in range(BLOCK):
+                empty = verdict == 1
+                if verdict < 0:
+                    x = (corner_i + i0 + di + 0.5) * cell
+                    y = (corner_j + j0 + dj + 0.5) * cell
+                    for v in range(view.shape[0]):
+                        if not empty:
+                            fx = ti.abs(x - view[v, 0]) + 0.5 * cell
+                            fy = ti.abs(y - view[v, 1]) + 0.5 * cell
+                            far = ti.sqrt(fx * fx + fy * fy) + SLACK
+                            if far <= view[v, 5]:
+                                empty = proves(
+                                    view, beams[v], reach, v, x, y, 0.7071068 * cell, far
+                                )
+                seen[j0 + dj, i0 + di] = ti.cast(empty, ti.u8)
 
 
 @ti.func
@@ -191,9 +229,7 @@ def mark_piece(
     pad = 0.25 * cell
     for w in range(view.shape[0]):
         if w != v and not inside:
-            inside = keeps_out(
-                view, beams[w], ranges, reach, far_side, w, x, y, pad, tolerance
-            )
+            inside = keeps_out(view, beams[w], ranges, reach, far_side, w, x, y, pad, tolerance)
     if not inside:
         i = ti.cast(ti.floor(x / cell), ti.i32) - corner_i
         j = ti.cast(ti.floor(y / cell), ti.i32) - corner_j
@@ -245,9 +281,23 @@ def mark_sources(
                 for k in range(pieces + 1):
                     at = bearing + angle * k / pieces
                     mark_piece(
-                        view, beams, ranges, reach, far_side, marks, v, scans, side,
-                        view[v, 0] + r * ti.cos(at), view[v, 1] + r * ti.sin(at),
-                        grid, blind_apart, corner_i, corner_j, cell, tolerance,
+                        view,
+                        beams,
+                        ranges,
+                        reach,
+                        far_side,
+                        marks,
+                        v,
+                        scans,
+                        side,
+                        view[v, 0] + r * ti.cos(at),
+                        view[v, 1] + r * ti.sin(at),
+                        grid,
+                        blind_apart,
+                        corner_i,
+                        corner_j,
+                        cell,
+                        tolerance,
                     )
             # the step along this beam, between the wedge before it and the wedge after it
             before = beam - 1
@@ -271,9 +321,23 @@ def mark_sources(
                     for k in range(pieces + 1):
                         at = near + (far - near) * k / pieces
                         mark_piece(
-                            view, beams, ranges, reach, far_side, marks, v, scans, kind,
-                            view[v, 0] + at * ti.cos(bearing), view[v, 1] + at * ti.sin(bearing),
-                            grid, blind_apart, corner_i, corner_j, cell, tolerance,
+                            view,
+                            beams,
+                            ranges,
+                            reach,
+                            far_side,
+                            marks,
+                            v,
+                            scans,
+                            kind,
+                            view[v, 0] + at * ti.cos(bearing),
+                            view[v, 1] + at * ti.sin(bearing),
+                            grid,
+                            blind_apart,
+                            corner_i,
+                            corner_j,
+                            cell,
+                            tolerance,
                         )
             # the surface itself
             if met[v, beam] >= MOVABLE:

@@ -156,7 +156,9 @@ def mean_cost(times: np.ndarray, costs: np.ndarray, horizon: float) -> float:
     taken = float(times[-1] - times[0])
     span = max(horizon, taken)
     rest = span - taken
-    return (spent + rest * float(costs[-1])) / span if not math.isclose(span, 0) else float(costs[-1])
+    return (
+        (spent + rest * float(costs[-1])) / span if not math.isclose(span, 0) else float(costs[-1])
+    )
 
 
 def _map_points(static_map: StaticMap) -> np.ndarray:

@@ -204,8 +204,8 @@ class Navigator:
             common, decision=decision, reason=reason, timings=timings, tree=tree,
             tree_nodes=tree.count, tree_depth=tree.depth, tree_stopped_by=tree.stopped_by,
             cost=cost_new if decision == "new" else cost_held, cost_new=cost_new,
-            cost_held=cost_held, plan_time=max(self.held.end - start, 0.0), decision_time=decision_time,
-            particle_leaves=particles, chosen=self.held,
+            cost_held=cost_held, plan_time=max(self.held.end - start, 0.0),
+            decision_time=decision_time, particle_leaves=particles, chosen=self.held,
         )  # fmt: skip
 
     def _arrive(self, state: np.ndarray, root: np.ndarray, start: float) -> bool:
@@ -249,9 +249,9 @@ class Navigator:
             return ROOT, (), math.inf
         costs = leaf_costs(tree, self.settings)
         if self._swarm is None:
-            leaf, particles = best_leaf(tree, costs), ()
-        else:
-            leaf, particles = self._swarm.choose(tree, costs, self._generator)
+            leaf = best_leaf(tree, costs)
+            return leaf, (), float(costs[leaf])
+        leaf, particles = self._swarm.choose(tree, costs, self._generator)
         return leaf, particles, float(costs[leaf])
 
     def _decision_time(
@@ -268,7 +268,9 @@ class Navigator:
             pace = self.settings.steps_of(COAST_PACE)
             steps = max(pace, 1) * round(COAST / COAST_PACE)
             coasting = follow(
-                model, to_poses(last[None], model.window.anchor)[0], [(np.zeros(3, dtype=np.float32), steps)]
+                model,
+                to_poses(last[None], model.window.anchor)[0],
+                [(np.zeros(3, dtype=np.float32), steps)],
             )[:: max(pace, 1)]
             coast_times = max(turn, start) + self.settings.time_step * max(pace, 1) * np.arange(
                 len(coasting)
@@ -292,4 +294,3 @@ class _Clock:
         now = time.perf_counter()
         self._timings[name] = now - self._last
         self._last = now
-

@@ -19,9 +19,7 @@ def trajectory_to(tree: Tree, leaf: int) -> Trajectory:
     return _as_trajectory(tree.model, tree.pose[ROOT], [*parts, (tail, -1)], tree.start, planned)
 
 
-def braking_from(
-    model: FutureModel, state: np.ndarray, start: float, control: int
-) -> Trajectory:
+def braking_from(model: FutureModel, state: np.ndarray, start: float, control: int) -> Trajectory:
     """Braking at once from `state` [5] at `start` [s] by one control of the braking set."""
     pose = to_poses(state[None], model.window.anchor)[0]
     return _as_trajectory(model, pose, [(model.body.braking[control], -1)], start, 0)

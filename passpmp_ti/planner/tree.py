@@ -16,7 +16,6 @@ from passpmp_ti.kernels.tree import (
     CONTROL,
     FIRST,
     PARENT,
-    PROOF,
     STEPS,
     WHAT,
     grow_level,
@@ -144,9 +143,7 @@ class Tree:
         return found
 
 
-def follow(
-    model: FutureModel, pose: np.ndarray, parts: list[tuple[np.ndarray, int]]
-) -> np.ndarray:
+def follow(model: FutureModel, pose: np.ndarray, parts: list[tuple[np.ndarray, int]]) -> np.ndarray:
     """Poses along some controls in turn, by the integrator that verified them.
 
     Args:

@@ -114,7 +114,7 @@ def _extension(
         return np.zeros((0, 3)), float(last[0])
     rows = []
     if np.hypot(*velocity) < STANDING:
-        rows.append(last + (sign * LINGER, 0.0, 0.0))
+        rows.append(np.array([last[0] + sign * LINGER, last[1], last[2]]))
         ways = sorted(
             (PACE * np.array([np.cos(a), np.sin(a)]) for a in np.arange(0.0, 2 * np.pi, TURN)),
             key=lambda way: _time_to_edge(last[1:], way, edge),

@@ -11,13 +11,14 @@ from passpmp_ti.kernels.check import trace
 from passpmp_ti.kernels.tree import BRAKED, CONTROL, FIRST, PARENT, STEPS, WHAT
 from passpmp_ti.planner.tree import ROOT, Tree
 
-POINTS = 9
-"""Points of a line."""
+SMOOTH = 0.1
+"""Time between the points of a line, at most about [s]."""
+LEAST_POINTS, MOST_POINTS = 9, 33
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Branches:
-    """Lines [n, 9, 2] through the world [m]."""
+    """Lines [n, points, 2] through the world [m]."""
 
     nodes: np.ndarray
     """[n] node that each of `safe` leads to."""
@@ -29,7 +30,7 @@ class Branches:
     """Primitives that were tried and are not p-safe."""
 
     def through(self, tree: Tree, leaves: tuple[int, ...]) -> np.ndarray:
-        """[m, 9, 2] the p-safe primitives on the way from the root to any of `leaves`."""
+        """[m, points, 2] the p-safe primitives on the way from the root to any of `leaves`."""
         on_the_way = np.zeros(tree.count, dtype=bool)
         for leaf in leaves:
             node = int(leaf)
@@ -73,11 +74,12 @@ def _rejected(tree: Tree) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 def _lines(tree: Tree, parents: np.ndarray, controls: np.ndarray,
            steps: np.ndarray) -> np.ndarray:
-    """[n, 9, 2] the motions from `parents` under `controls` [n, 3] for `steps` [n]."""
-    count = len(parents)
+    """[n, points, 2] the motions from `parents` under `controls` [n, 3] for `steps` [n]."""
+    model, count = tree.model, len(parents)
+    longest_primitive = max((model.settings.cycle, *model.settings.primitives))
+    points = int(np.clip(longest_primitive / SMOOTH, LEAST_POINTS, MOST_POINTS))
     if not count:
-        return np.zeros((0, POINTS, 2))
-    model = tree.model
+        return np.zeros((0, points, 2))
     longest = model.settings.steps_of(model.robot.longest_braking) + 4
     rows = 1 + (longest if (steps < 0).any() else int(steps.max()))
     path = np.empty((count * rows, 7), dtype=np.float32)
@@ -86,6 +88,6 @@ def _lines(tree: Tree, parents: np.ndarray, controls: np.ndarray,
         model.body.kind, model.body.numbers, np.ascontiguousarray(tree.pose[parents]),
         np.ascontiguousarray(controls, dtype=np.float32), steps.astype(np.int32), path, length,
     )  # fmt: skip
-    share = np.linspace(0.0, 1.0, POINTS)
+    share = np.linspace(0.0, 1.0, points)
     picked = np.round(share * (length[:, None] - 1)).astype(int) + rows * np.arange(count)[:, None]
-    return to_states(path[picked.ravel()], model.window.anchor)[:, :2].reshape(count, POINTS, 2)
+    return to_states(path[picked.ravel()], model.window.anchor)[:, :2].reshape(count, points, 2)

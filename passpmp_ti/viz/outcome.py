@@ -46,7 +46,7 @@ class Outcome:
         self._with_video = video
         self._canvas: Canvas | None = None
         self._writer: VideoWriter | None = None
-        self._frames = 1  # of the video, a cycle
+        self._frames = 1  # of the video in a cycle
         self._trail: list[np.ndarray] = []
         self._count = 0
         self._stride = 1
@@ -67,20 +67,22 @@ class Outcome:
                 self._keep(moment.time, image)
             if self._writer is not None:
                 self._writer.write(image)
-                self._write_between(info, moment)
         self._last = moment
         self._count += 1
+        self._go_on(info, moment)
 
-    def _write_between(self, info: CycleInfo, moment: Moment) -> None:
-        """Frames until the next cycle, where cycles are long: all moves on, the plan stays."""
+    def _go_on(self, info: CycleInfo, moment: Moment) -> None:
+        """Until the next cycle, where cycles are long: all moves on, the plan stays."""
         assert self._canvas is not None
-        assert self._writer is not None
         ahead = info.navigator.settings.cycle * np.arange(1, self._frames) / self._frames
-        states = info.executing.sampled(info.time + ahead)
-        for n, state in enumerate(states):
-            trail = np.concatenate([moment.trail, states[: n + 1, :2]])
-            between = replace(moment, time=info.time + float(ahead[n]), state=state, trail=trail)
-            self._writer.write(draw_cycle(between, self._canvas, region_states=COARSE))
+        for seconds in ahead:
+            time = info.time + float(seconds)
+            state = info.executing.at(time)
+            self._trail.append(state[:2])
+            if self._writer is not None:
+                between = replace(moment, time=time, state=state, trail=np.array(self._trail))
+                image = draw_cycle(between, self._canvas, region_states=COARSE)
+                self._writer.write(image)
 
     def finish(self, episode: Episode) -> dict[str, Any]:
         """Write `summary.json` and `episode.npz`; returns the summary."""
@@ -112,9 +114,9 @@ class Outcome:
     def _begin(self, info: CycleInfo) -> None:
         self._canvas = Canvas(info.world.bounds)
         self._canvas.title(self._heading, self._detail)
+        cycle = info.navigator.settings.cycle
+        self._frames = math.ceil(cycle * LEAST_FPS - 1e-9)
         if self._with_video:
-            cycle = info.navigator.settings.cycle
-            self._frames = math.ceil(cycle * LEAST_FPS - 1e-9)
             fps = min(self._frames / cycle, MOST_FPS)
             self._writer = VideoWriter(self.folder / "video.mp4", self._canvas.layout.page, fps)
 

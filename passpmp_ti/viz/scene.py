@@ -81,7 +81,7 @@ def draw_cycle(moment: Moment, canvas: Canvas, *, region_states: int = 20_000) -
     _paint(moment, canvas, region, branches)
     (x, y, w, h), below = canvas.layout.panel, canvas.layout.panel_below
     foot = panel.draw(canvas.page, (x, y, w, h), below, "This cycle", _readings(moment),
-                      moment.record.lost_scan or moment.record.reason, _legend(region))
+                      moment.record.lost_scan or moment.record.reason, _legend(moment, region))
     side = min(w, y + h - foot - panel.CLOSE_UP_HEAD)
     if side >= LEAST_CLOSE_UP:
         half = 0.5 * side / (MAGNIFY * canvas.scale)
@@ -165,10 +165,14 @@ def _readings(moment: Moment) -> list[Reading]:
     ]
 
 
-def _legend(region: Region | None) -> list[Entry]:
-    if region is None:
-        return [e for e in ENTRIES if e.colour != palette.ICS]
-    label = f"braking ICS at {region.speed:.1f} m/s"
+def _legend(moment: Moment, region: Region | None) -> list[Entry]:
+    """What the colours mean; a robot at rest is p-safe by definition, so it has no region."""
+    if region is not None:
+        label = f"braking ICS at {region.speed:.1f} m/s"
+    elif moment.record.model is not None and moment.robot.at_rest(moment.state):
+        label = "braking ICS (none at rest)"
+    else:
+        label = "braking ICS (not drawn)"
     return [
         Entry(e.sign, e.colour, label) if e.colour == palette.ICS else e for e in ENTRIES
     ]
