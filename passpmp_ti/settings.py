@@ -81,6 +81,9 @@ class Settings:
     """V_pmax of Algorithm 3; priorities lie in [0, 1]."""
     guide: str = "safe_time"
     """"safe_time": time to the goal at the speed that will be safe; "euclidean": the paper's."""
+    guide_movers: bool = False
+    """Whether the guide keeps away from movers where they are now, as from corners: worth it among
+    people who stand about, not among fast movers that are elsewhere by then."""
     distance: str = "mean"
     """"mean": the guide averaged along the plan; "final": at its last state (eq. 18)."""
     weight_distance: float = 1.0
@@ -132,6 +135,10 @@ class Settings:
             raise ValueError(
                 f"Settings.blind_speed = {self.blind_speed:g} m/s is above object_speed ="
                 f" {self.object_speed:g} m/s, which bounds every object; leave it out or lower it"
+            )
+        if not isinstance(self.guide_movers, bool):
+            raise ValueError(
+                f"Settings.guide_movers must be true or false; got {self.guide_movers!r}"
             )
         if self.window is not None:
             door.whole(name, "window", self.window, least=16, most=8192)
@@ -197,7 +204,7 @@ class Settings:
                 primitives=(0.4, 0.6, 1.0),
                 goal_tolerance=0.3,
                 particles=50,
-                cruise_speed=1.5,
+                cruise_speed=1.5, guide_movers=True,
             )
         return cls(**own).changed(**changes)
 

@@ -95,7 +95,8 @@ def machine() -> dict[str, Any]:
     """The machine, in words and numbers, and the versions of what ran on it."""
     return {
         "machine": processor(),
-        "cores": len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity")
+        "cores": len(os.sched_getaffinity(0))
+        if hasattr(os, "sched_getaffinity")
         else os.cpu_count(),
         "system": f"{platform.system()} {platform.release()}",
         "python": sys.version.split()[0],

@@ -12,6 +12,8 @@ NEVER = 65535
 LATEST = 65534
 TICK_SLACK = 0.05  # [ticks] f32 rounding of a time must never free a cell
 
+SAMPLING = 0.5  # [cells] between what may come out and the nearest mark
+
 Distances = ti.types.ndarray(dtype=ti.f32, ndim=2)  # [J, I] cells
 Arrival = ti.types.ndarray(dtype=ti.u16, ndim=2)  # [J, I] ticks
 
@@ -56,12 +58,13 @@ def arrival_times(
     arrival: Arrival,
 ):
     # Distances are between cells, any point of either. A source's samples are a quarter of a cell
-    # apart, so a border point may lie an eighth of a cell outside a marked cell.
+    # apart, so where another view takes over, what comes out may do so a quarter of a cell from
+    # the last mark, and another quarter is forgiven behind a standing surface.
     rounding = 1e-3 * cell + SLACK
     for j, i in arrival:
         ticks = 0
         if to_unseen[j, i] * cell - rounding > clearance:
-            taken = rounding + 0.125 * cell + clearance
+            taken = rounding + SAMPLING * cell + clearance
             ticks = ti.min(
                 arrival_ticks(to_source[j, i] * cell - taken, speed, stamp_error),
                 arrival_ticks(to_blind[j, i] * cell - taken, blind_speed, stamp_error),

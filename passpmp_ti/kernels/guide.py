@@ -115,7 +115,7 @@ def guide_at(time: ti.template(), ahead: ti.template(), frame: ti.template(), x,
 
     frame: 0, 1 corner of cell [0, 0]; 2 cells a metre; 3, 4 goal; 5: 1 straight distance [m],
     0 the field [s]; 6 radius about the goal within which the cost is 0 [m]; 7 time that a turn
-    by a right angle takes [s]; 8, 9 column and row at which `ahead` begins.
+    by a right angle takes [s]; 8, 9 column and row at which `ahead` begins; 10 seconds a metre in the open.
     """
     dx = x - frame[3]
     dy = y - frame[4]
@@ -132,7 +132,12 @@ def guide_at(time: ti.template(), ahead: ti.template(), frame: ti.template(), x,
         v = fy - j
         low = time[j, i] * (1 - u) + time[j, i + 1] * u
         high = time[j + 1, i] * (1 - u) + time[j + 1, i + 1] * u
-        cost = low * (1 - v) + high * v
+        # off the grid, the way back to it is added
+        cost = (
+            low * (1 - v)
+            + high * v
+            + ti.sqrt((px - 0.5 - fx) ** 2 + (py - 0.5 - fy) ** 2) * (frame[10] / frame[2])
+        )
         ai = ti.cast(ti.floor(px - frame[8]), ti.i32)
         aj = ti.cast(ti.floor(py - frame[9]), ti.i32)
         if frame[7] > 0.0 and ai >= 0 and aj >= 0 and ai < ahead.shape[1] and aj < ahead.shape[0]:
@@ -146,7 +151,7 @@ def guide_costs(
     # in
     time: Field,
     ahead: ti.types.ndarray(dtype=ti.f32, ndim=3),
-    frame: ti.types.ndarray(dtype=ti.f32, ndim=1),  # [10]
+    frame: ti.types.ndarray(dtype=ti.f32, ndim=1),  # [11]
     places: ti.types.ndarray(dtype=ti.f32, ndim=2),  # [N, 4]: x, y, cos theta, sin theta
     # out
     cost: ti.types.ndarray(dtype=ti.f32, ndim=1),  # [N]

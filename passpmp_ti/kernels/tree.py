@@ -53,7 +53,7 @@ def grow_level(
     arrival: Arrival,  # [J, I]
     guide: ti.types.ndarray(dtype=ti.f32, ndim=2),
     ahead: ti.types.ndarray(dtype=ti.f32, ndim=3),
-    guide_frame: Numbers,  # [10]
+    guide_frame: Numbers,  # [11]
     numbers: Numbers,  # [16]
     counts: Counts,  # [8]
     braking: Table,  # [B, 3]

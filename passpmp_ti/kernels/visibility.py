@@ -66,8 +66,13 @@ def proves(view: ti.template(), n, reach: ti.template(), v, x, y, pad, far):
 
 
 @ti.func
-def before_wall(view: ti.template(), n, ranges: ti.template(), v, w, x, y, tolerance):
-    """Whether (x, y) is on the sensor's side of the surface that shuts wedge w of view v."""
+def before_wall(view: ti.template(), n, ranges: ti.template(), v, w, x, y, tolerance, cell):
+    """Whether (x, y) is on the sensor's side of the surface that shuts wedge w of view v.
+
+    The surface is known as the chord between two returns. Its true course may lie behind the
+    chord, in a corner, by half the chord's length; a quarter of a cell of that is forgiven, and
+    charged in kernels/arrival.py.
+    """
     a = view[v, 2] + w * view[v, 3]
     b = a + view[v, 3]
     last = w + 1
@@ -85,8 +90,9 @@ def before_wall(view: ti.template(), n, ranges: ti.template(), v, w, x, y, toler
         px = x - view[v, 0] - ax
         py = y - view[v, 1] - ay
         length = ti.sqrt(bx * bx + by * by)
+        forgiven = tolerance + ti.min(0.5 * length, 0.25 * cell)
         # the sensor lies to the left of the way from a to b (bearings grow counter-clockwise)
-        result = bx * py - by * px >= -tolerance * length
+        result = bx * py - by * px >= -forgiven * length
     return result
 
 
@@ -100,10 +106,10 @@ def keeps_out(
     v,
     x,
     y,
-    pad,
     tolerance,
+    cell,
 ):
-    """Whether view v shows that no mover is within `pad` of (x, y).
+    """Whether view v shows that no mover can be at (x, y).
 
     Either it proves the place empty, or the place is in a wedge that a standing surface shuts,
     on this side of it: nothing as wide as an object fits between two beams that both reached the
@@ -112,21 +118,10 @@ def keeps_out(
     dx = x - view[v, 0]
     dy = y - view[v, 1]
     r = ti.sqrt(dx * dx + dy * dy)
-    ok = True
-    if r > 2.0 * pad:
-        first, count = wedges_across(view, n, v, x, y, pad)
-        k = 0
-        while ok and k < count:
-            w = first + k
-            if w >= n:
-                w -= n
-            ok = reach[v, w] >= r + pad or (
-                far_side[v, w] == SHUT and before_wall(view, n, ranges, v, w, x, y, tolerance)
-            )
-            k += 1
-    else:
-        ok = proves(view, n, reach, v, x, y, pad, r + pad)
-    return ok
+    w = wedge_at(view, n, v, ti.atan2(dy, dx))
+    return reach[v, w] >= r or (
+        far_side[v, w] == SHUT and before_wall(view, n, ranges, v, w, x, y, tolerance, cell)
+    )
 
 
 @ti.func
@@ -226,10 +221,9 @@ def mark_piece(
 ):
     """Mark the cell of one sample of a border piece, unless another view sees past it."""
     inside = False
-    pad = 0.25 * cell
     for w in range(view.shape[0]):
         if w != v and not inside:
-            inside = keeps_out(view, beams[w], ranges, reach, far_side, w, x, y, pad, tolerance)
+            inside = keeps_out(view, beams[w], ranges, reach, far_side, w, x, y, tolerance, cell)
     if not inside:
         i = ti.cast(ti.floor(x / cell), ti.i32) - corner_i
         j = ti.cast(ti.floor(y / cell), ti.i32) - corner_j

@@ -36,7 +36,7 @@ class GuideField:
     ahead: np.ndarray
     """[j, i, 2] float32: unit vectors along the way down, about the robot."""
     frame: np.ndarray
-    """[10] float32, see kernels/guide.py."""
+    """[11] float32, see kernels/guide.py."""
     anchor: tuple[float, float]
 
     def at(self, states: np.ndarray) -> np.ndarray:
@@ -67,6 +67,7 @@ class Guide:
         self._robot = robot
         self._settings = settings
         self._anchor = anchor
+        self._cruise = settings.cruise_speed or robot.top_speed
         places = np.array([start, *goals]) - np.array(anchor)
         pad = 0.4 * sensor_reach
         self._low = places.min(axis=0) - pad
@@ -81,13 +82,14 @@ class Guide:
         self, model: FutureModel, goal: tuple[float, float], position: np.ndarray
     ) -> GuideField:
         """The cost to go to `goal`, given what this cycle's model shows from `position` [2]."""
-        frame = np.zeros(10, dtype=np.float32)
+        frame = np.zeros(11, dtype=np.float32)
         local_goal = np.array(goal) - np.array(self._anchor)
         frame[:2] = self._low
         frame[2] = 1 / self._cell
         frame[3:5] = local_goal
         # a cost of zero in the middle of the tolerance, so that plans stop well inside it
         frame[6] = 0.4 * self._settings.goal_tolerance
+        frame[10] = 1 / self._cruise
         frame[7] = self._settings.weight_turn * self._robot.turn_time
         if self._settings.guide == "euclidean":
             frame[5] = 1
@@ -116,11 +118,14 @@ class Guide:
         seconds to brake, less the cycle and the first primitive: v = a (...).
         """
         settings, robot = self._settings, self._robot
-        cruise = settings.cruise_speed or robot.top_speed
+        cruise = self._cruise
         clearance = settings.clearance(robot)
         speed = np.full(self._walls.shape, cruise)
         corners = np.ones(self._walls.shape, dtype=np.uint8)
         self._mark(corners, _centres(model, model.standing_sources) - np.array(self._anchor))
+        if settings.guide_movers:
+            # where they are now: nose to somebody who stands, a robot cannot even turn
+            self._mark(corners, _centres(model, model.movable) - np.array(self._anchor))
         if settings.object_speed > 0 and not corners.all():
             room = distance_to_zeros(corners) * self._cell - clearance - settings.cell
             spare = room / settings.object_speed - 2 * settings.cycle

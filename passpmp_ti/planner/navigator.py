@@ -164,7 +164,8 @@ class Navigator:
         root_brake = int(model.proving_brakes(root[None], np.array([start]))[0])
         common = CycleRecord(
             stamp=stamp, decision="held", goal=self.goal, deviation=deviation,
-            root_proved=root_brake >= 0, broken_premises=model.broken_premises, model=model,
+            root_proved=root_brake >= 0, held_clear=still_clear(model, self.held, start),
+            broken_premises=model.broken_premises, model=model,
         )  # fmt: skip
         lost = deviation > settings.tracking_error + POSE_SLACK
         if len(model.broken_premises) or lost:

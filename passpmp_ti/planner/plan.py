@@ -38,8 +38,8 @@ def longest_clear_braking(model: FutureModel, state: np.ndarray, start: float) -
     return best
 
 
-def still_clear(model: FutureModel, trajectory: Trajectory) -> bool:
-    """Whether the model, asked afresh at the trajectory's own samples, finds all of it free.
+def still_clear(model: FutureModel, trajectory: Trajectory, since: float = -np.inf) -> bool:
+    """Whether the model, asked at the trajectory's own samples from `since` on, finds it free.
 
     The same look-ups that verified it: each sample while the robot moves, judged half a step
     later. This is a second opinion on the whole path, not a new proof at other times.
@@ -50,6 +50,7 @@ def still_clear(model: FutureModel, trajectory: Trajectory) -> bool:
     moves = ~resting
     moves[:-1] |= ~resting[1:]
     moves[1:] |= ~resting[:-1]
+    moves &= trajectory.times >= since - 1e-9
     if not moves.any():
         return True
     half = 0.5 * model.settings.time_step

@@ -41,7 +41,11 @@ class CycleRecord:
     decision_time: float = float("inf")
     """delta_d of eq. 20 [s]: from t_k until the held motion, kept on, could no longer be braked."""
     root_proved: bool = True
-    """Whether a fresh check of s_{k+1}, at this cycle's sample times, calls it p-safe."""
+    """Whether a fresh check of s_{k+1} finds a braking control that proves it. In the middle of a
+    primitive none needs to: what is held ends at rest another way, see `held_clear`."""
+    held_clear: bool = True
+    """Whether what was held, judged by this cycle's model at its own sample times, is still free
+    to its end: the certificate. Only a broken premise may make it False."""
     broken_premises: np.ndarray = field(default_factory=lambda: np.zeros((0, 2)))
     """[n, 2] places [m] where a return stood in space proven free."""
     lost_scan: str = ""

@@ -17,9 +17,7 @@ LOOK_BACK = 3.0  # a mover's speed is told for this long before a contact [s]
 SPEED_STEP = 0.02  # and measured over this [s]
 
 
-def closest_approach(
-    p0: np.ndarray, p1: np.ndarray, q0: np.ndarray, q1: np.ndarray
-) -> np.ndarray:
+def closest_approach(p0: np.ndarray, p1: np.ndarray, q0: np.ndarray, q1: np.ndarray) -> np.ndarray:
     """Least distance between two points that each move evenly along a line in the same time.
 
     Args:
@@ -70,8 +68,9 @@ def disc_centres(robot: Robot, states: np.ndarray) -> np.ndarray:
     return states[:, None, :2] + offsets[:, None] * heading[:, None]
 
 
-def gaps_to_movers(robot: Robot, states: np.ndarray, positions: np.ndarray,
-                   radius: np.ndarray) -> np.ndarray:
+def gaps_to_movers(
+    robot: Robot, states: np.ndarray, positions: np.ndarray, radius: np.ndarray
+) -> np.ndarray:
     """[n - 1, m] least gap between the robot and each mover in each step [m], < 0 in contact.
 
     Args:
@@ -142,20 +141,29 @@ class Judge:
                 fastest = float(speed[step : step + 2].max())
                 self._touch(n, times[step : step + 2], states[step], bool(moving[step]), fastest)
 
-    def _touch(self, mover: int, times: np.ndarray, state: np.ndarray, moving: bool,
-               speed: float) -> None:
+    def _touch(
+        self, mover: int, times: np.ndarray, state: np.ndarray, moving: bool, speed: float
+    ) -> None:
         known = self._open.get(mover)
         if known:
             self._open[mover] = replace(
-                known, end=float(times[1]), moving=known.moving or moving,
+                known,
+                end=float(times[1]),
+                moving=known.moving or moving,
                 robot_speed=max(known.robot_speed, speed),
             )
             return
         at_contact, top = self._speeds(mover, float(times[1]))
         self._open[mover] = Contact(
-            mover=mover, start=float(times[0]), end=float(times[1]), moving=moving,
-            moving_at_start=moving, robot_speed=speed, mover_speed=at_contact,
-            mover_top_speed=top, place=(float(state[0]), float(state[1])),
+            mover=mover,
+            start=float(times[0]),
+            end=float(times[1]),
+            moving=moving,
+            moving_at_start=moving,
+            robot_speed=speed,
+            mover_speed=at_contact,
+            mover_top_speed=top,
+            place=(float(state[0]), float(state[1])),
         )
 
     def _speeds(self, mover: int, time: float) -> tuple[float, float]:
@@ -174,7 +182,7 @@ class Judge:
         reach = self._robot.radius + 2.0
         low, high = states[:, :2].min(axis=0) - reach, states[:, :2].max(axis=0) + reach
         first, second = self._segments[:, :2], self._segments[:, 2:]
-        near = (
-            (np.minimum(first, second) <= high) & (np.maximum(first, second) >= low)
-        ).all(axis=1)
+        near = ((np.minimum(first, second) <= high) & (np.maximum(first, second) >= low)).all(
+            axis=1
+        )
         return self._segments[near]

@@ -28,9 +28,7 @@ def find_data(text: str, beside: Path) -> Path:
     filled = re.sub(r"\$\{(\w+)\}", lambda m: known[m[1]], text)
     path = beside.parent / filled
     if not path.is_file():
-        remedy = (
-            f"; set {DATA} to the folder that holds the recorded data" if DATA in text else ""
-        )
+        remedy = f"; set {DATA} to the folder that holds the recorded data" if DATA in text else ""
         raise ValueError(f"{path}: no such file{remedy}")
     return path
 

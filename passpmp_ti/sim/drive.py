@@ -46,9 +46,7 @@ class Drive:
 
     def note(self, record: CycleRecord, seconds: float) -> None:
         """Keep a cycle's record, without what only its own picture needs."""
-        self.records.append(
-            replace(record, model=None, tree=None, particle_leaves=(), chosen=None)
-        )
+        self.records.append(replace(record, model=None, tree=None, particle_leaves=(), chosen=None))
         self.update_times.append(seconds)
 
     def go_on(self, begin: float, end: float) -> None:

@@ -116,10 +116,28 @@ class Episode:
         present = np.array([movers.present(t) for t in self.times])
         positions = movers.positions(self.times)
         positions = np.where(present[:, :, None], positions, np.nan).astype(np.float32)
-        fields = ("mover", "start", "end", "moving", "moving_at_start", "robot_speed",
-                  "mover_speed", "mover_top_speed")
-        told = ("stamp", "cost", "cost_new", "cost_held", "plan_time", "decision_time",
-                "tree_nodes", "tree_depth", "root_proved", "deviation")
+        fields = (
+            "mover",
+            "start",
+            "end",
+            "moving",
+            "moving_at_start",
+            "robot_speed",
+            "mover_speed",
+            "mover_top_speed",
+        )
+        told = (
+            "stamp",
+            "cost",
+            "cost_new",
+            "cost_held",
+            "plan_time",
+            "decision_time",
+            "tree_nodes",
+            "tree_depth",
+            "root_proved",
+            "deviation",
+        )
         timings = sorted({key for r in self.records for key in r.timings})
         return {
             "times": self.times,
@@ -130,8 +148,10 @@ class Episode:
             "goals": np.array(self.scenario.goals),
             **{f"contact_{k}": np.array([getattr(c, k) for c in self.contacts]) for k in fields},
             **{f"cycle_{k}": np.array([getattr(r, k) for r in self.records]) for k in told},
-            **{f"seconds_{key}": np.array([r.timings.get(key, np.nan) for r in self.records])
-               for key in timings},
+            **{
+                f"seconds_{key}": np.array([r.timings.get(key, np.nan) for r in self.records])
+                for key in timings
+            },
             "cycle_decision": np.array([r.decision for r in self.records]),
             "cycle_broken_premises": np.array([len(r.broken_premises) for r in self.records]),
             "seconds_update": self.update_times,
@@ -170,8 +190,10 @@ def simulate(
     """
     if not isinstance(scenario, Scenario):
         scenario = load_scenario(scenario)
-    chosen = settings if isinstance(settings, Settings) else scenario.settings.changed(
-        **(settings or {})
+    chosen = (
+        settings
+        if isinstance(settings, Settings)
+        else scenario.settings.changed(**(settings or {}))
     )
     if mode is not None:
         chosen = chosen.changed(mode=mode)
@@ -194,22 +216,38 @@ def simulate(
         answer = navigator.update(scans, state)
         drive.note(navigator.record, clock.perf_counter() - began)
         if on_cycle is not None:
-            on_cycle(CycleInfo(
-                time=stamp, world=world, navigator=navigator, state=state, scans=scans,
-                contacts=drive.judge.contacts, executing=drive.executing,
-            ))
+            on_cycle(
+                CycleInfo(
+                    time=stamp,
+                    world=world,
+                    navigator=navigator,
+                    state=state,
+                    scans=scans,
+                    contacts=drive.judge.contacts,
+                    executing=drive.executing,
+                )
+            )
         if navigator.reached:
             reached_at = stamp
             break
         drive.go_on(stamp, stamp + chosen.cycle)
         drive.executing = answer
     return Episode(
-        scenario=scenario, settings=chosen, seed=seed, world=world, start_time=start_time,
-        reached_at=reached_at, times=np.concatenate(drive.times),
-        states=np.concatenate(drive.states), distance=drive.distance,
-        time_moving=drive.time_moving, contacts=tuple(drive.judge.contacts),
-        nearest_mover=drive.judge.nearest_mover, nearest_wall=drive.judge.nearest_wall,
-        records=tuple(drive.records), update_times=np.array(drive.update_times),
+        scenario=scenario,
+        settings=chosen,
+        seed=seed,
+        world=world,
+        start_time=start_time,
+        reached_at=reached_at,
+        times=np.concatenate(drive.times),
+        states=np.concatenate(drive.states),
+        distance=drive.distance,
+        time_moving=drive.time_moving,
+        contacts=tuple(drive.judge.contacts),
+        nearest_mover=drive.judge.nearest_mover,
+        nearest_wall=drive.judge.nearest_wall,
+        records=tuple(drive.records),
+        update_times=np.array(drive.update_times),
     )
 
 

@@ -19,9 +19,7 @@ def point_to_segment(points: np.ndarray, a: np.ndarray, b: np.ndarray) -> np.nda
     return np.sqrt((gap * gap).sum(axis=-1))
 
 
-def segment_to_segment(
-    p0: np.ndarray, p1: np.ndarray, a: np.ndarray, b: np.ndarray
-) -> np.ndarray:
+def segment_to_segment(p0: np.ndarray, p1: np.ndarray, a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """[...] distance between the segments p0 p1 and a b, each [..., 2], broadcast [m]."""
     apart = np.minimum(
         np.minimum(point_to_segment(p0, a, b), point_to_segment(p1, a, b)),
@@ -30,9 +28,7 @@ def segment_to_segment(
     return np.where(_cross_each_other(p0, p1, a, b), 0.0, apart)
 
 
-def _cross_each_other(
-    p0: np.ndarray, p1: np.ndarray, a: np.ndarray, b: np.ndarray
-) -> np.ndarray:
+def _cross_each_other(p0: np.ndarray, p1: np.ndarray, a: np.ndarray, b: np.ndarray) -> np.ndarray:
     d1, d2 = cross(b - a, p0 - a), cross(b - a, p1 - a)
     d3, d4 = cross(p1 - p0, a - p0), cross(p1 - p0, b - p0)
     return (d1 * d2 < 0) & (d3 * d4 < 0)

@@ -37,8 +37,14 @@ class Lidar:
         name = "Lidar"
         door.finite(name, "range_max", self.range_max, above=0.0, unit="m")
         door.whole(name, "beams", self.beams, least=2)
-        door.finite(name, "field_of_view", self.field_of_view, above=0.0,
-                    most=2 * math.pi + 1e-9, unit="rad")
+        door.finite(
+            name,
+            "field_of_view",
+            self.field_of_view,
+            above=0.0,
+            most=2 * math.pi + 1e-9,
+            unit="rad",
+        )
         door.array(name, "mount", self.mount, (3,))
         door.finite(name, "noise", self.noise, least=0.0, unit="m")
         door.choice(name, "labels", self.labels, LABELS)
@@ -69,8 +75,13 @@ class Lidar:
         c, s = math.cos(theta), math.sin(theta)
         return (x + c * mx - s * my, y + s * mx + c * my, theta + turn)
 
-    def scan(self, world: World, robot_pose: np.ndarray, stamp: float,
-             generator: np.random.Generator | None = None) -> Scan:
+    def scan(
+        self,
+        world: World,
+        robot_pose: np.ndarray,
+        stamp: float,
+        generator: np.random.Generator | None = None,
+    ) -> Scan:
         """One sweep, all of it at the instant `stamp`.
 
         A sensor inside an object sees nothing: all its beams are lost.
@@ -99,18 +110,26 @@ class Lidar:
                 # a return stays a return: an error neither loses a beam nor adds one
                 ranges = np.where(
                     np.isfinite(ranges),
-                    np.clip(ranges + np.clip(error, -limit, limit), 1e-6,
-                            np.nextafter(self.range_max, 0.0)),
+                    np.clip(
+                        ranges + np.clip(error, -limit, limit),
+                        1e-6,
+                        np.nextafter(self.range_max, 0.0),
+                    ),
                     ranges,
                 )
         return Scan(
-            ranges, angle_min=self._first, angle_increment=self._increment,
-            range_max=self.range_max, pose=pose, stamp=stamp,
+            ranges,
+            angle_min=self._first,
+            angle_increment=self._increment,
+            range_max=self.range_max,
+            pose=pose,
+            stamp=stamp,
             moving=moving if labelled else None,
         )
 
-    def _cast(self, world: World, pose: tuple[float, float, float],
-              stamp: float) -> tuple[np.ndarray, np.ndarray]:
+    def _cast(
+        self, world: World, pose: tuple[float, float, float], stamp: float
+    ) -> tuple[np.ndarray, np.ndarray]:
         bearings = pose[2] + self.bearings
         rays = np.stack([np.cos(bearings), np.sin(bearings)], axis=1).astype(np.float32)
         place = np.array(pose[:2])

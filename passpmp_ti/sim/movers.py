@@ -34,8 +34,13 @@ class PathMovers:
     Straight lines at constant speed between the points: the top speed is known exactly.
     """
 
-    def __init__(self, paths: Sequence[np.ndarray], radius: np.ndarray,
-                 born: np.ndarray | None = None, gone: np.ndarray | None = None) -> None:
+    def __init__(
+        self,
+        paths: Sequence[np.ndarray],
+        radius: np.ndarray,
+        born: np.ndarray | None = None,
+        gone: np.ndarray | None = None,
+    ) -> None:
         """Take over paths.
 
         Args:

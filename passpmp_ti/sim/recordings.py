@@ -69,9 +69,7 @@ class Recording:
             _, first = np.unique(own[:, 0], return_index=True)
             own = own[first]
             if len(own) > 1:
-                found.append(
-                    np.column_stack([own[:, 0] / self.clock, own[:, 2], own[:, 3]])
-                )
+                found.append(np.column_stack([own[:, 0] / self.clock, own[:, 2], own[:, 3]]))
         return found
 
 
@@ -99,9 +97,7 @@ def recorded_movers(
         paths.append(np.concatenate([head, track, tail]))
         born.append(before)
         gone.append(after)
-    return PathMovers(
-        paths, np.full(len(paths), radius), born=np.array(born), gone=np.array(gone)
-    )
+    return PathMovers(paths, np.full(len(paths), radius), born=np.array(born), gone=np.array(gone))
 
 
 def _extension(
@@ -139,7 +135,8 @@ def _time_to_edge(place: np.ndarray, velocity: np.ndarray, edge: Bounds) -> floa
     """How long a point inside the edge takes to it [s]."""
     return min(
         ((edge[axis + 2] if v > 0 else edge[axis]) - place[axis]) / v
-        for axis, v in enumerate(velocity) if abs(v) > 1e-9
+        for axis, v in enumerate(velocity)
+        if abs(v) > 1e-9
     )
 
 

@@ -85,8 +85,13 @@ class Scenario:
         world = World(self.bounds, self.polygons, self.walls, movers)
         return world, np.array([*self.start, 0.0, 0.0]), start_time
 
-    def changed(self, settings: Mapping[str, Any] | None = None, *,
-                object_speed: float | None = None, movers_speed: float | None = None) -> Scenario:
+    def changed(
+        self,
+        settings: Mapping[str, Any] | None = None,
+        *,
+        object_speed: float | None = None,
+        movers_speed: float | None = None,
+    ) -> Scenario:
         """This scenario with other settings, or at another speed.
 
         Args:
@@ -102,8 +107,9 @@ class Scenario:
         new = self.settings.changed(**(settings or {}))
         movers = self.movers
         if object_speed is not None:
-            speed = door.finite("Scenario.changed", "object_speed", object_speed, least=0.0,
-                                unit="m/s")
+            speed = door.finite(
+                "Scenario.changed", "object_speed", object_speed, least=0.0, unit="m/s"
+            )
             if new.blind_speed is not None:
                 new = new.changed(blind_speed=min(new.blind_speed, speed))
             new = new.changed(object_speed=speed)

@@ -53,10 +53,19 @@ def read_scenario(path: Path) -> Scenario:
         static_map = StaticMap.from_segments(world.outline)
     try:
         return Scenario(
-            name=path.stem, description=description, robot=robot, settings=settings, lidars=lidars,
-            bounds=world.bounds, polygons=tuple(world.polygons), walls=world.segments,
-            movers=movers, start=tuple(start.tolist()), goals=tuple(map(tuple, goals.tolist())),
-            duration=duration, static_map=static_map if told else None,
+            name=path.stem,
+            description=description,
+            robot=robot,
+            settings=settings,
+            lidars=lidars,
+            bounds=world.bounds,
+            polygons=tuple(world.polygons),
+            walls=world.segments,
+            movers=movers,
+            start=tuple(start.tolist()),
+            goals=tuple(map(tuple, goals.tolist())),
+            duration=duration,
+            static_map=static_map if told else None,
         )
     except ValueError as problem:
         key = "start" if " start: " in str(problem) else "goals"
@@ -105,13 +114,18 @@ def _lidar(section: Section) -> Lidar:
     labels = section.choice("labels", LABELS, "none")
     section.finish()
     return Lidar(
-        range_max=range_max or 1.0, beams=beams or 2, field_of_view=math.radians(degrees),
-        mount=tuple(mount.tolist()), noise=noise, labels=labels,
+        range_max=range_max or 1.0,
+        beams=beams or 2,
+        field_of_view=math.radians(degrees),
+        mount=tuple(mount.tolist()),
+        noise=noise,
+        labels=labels,
     )
 
 
-def _settings(root: Section, robot: Robot, movers: MoverSource,
-              lidars: tuple[Lidar, ...]) -> Settings:
+def _settings(
+    root: Section, robot: Robot, movers: MoverSource, lidars: tuple[Lidar, ...]
+) -> Settings:
     own = Settings.for_robot(robot)
     section = root.section("settings")
     wanted: dict[str, Any] = {}

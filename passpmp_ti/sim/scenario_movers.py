@@ -89,6 +89,9 @@ def _recording(section: Section) -> MoverSource:
     if path is None or format_ is None or clock is None or edge is None:
         return NobodyMoves()
     return RecordingSource(
-        recording=Recording(path=path, format=format_, clock=clock), edge=tuple(edge.tolist()),
-        radius=radius, keep_out=keep_out, start_time=start_time,
+        recording=Recording(path=path, format=format_, clock=clock),
+        edge=tuple(edge.tolist()),
+        radius=radius,
+        keep_out=keep_out,
+        start_time=start_time,
     )

@@ -25,8 +25,14 @@ class MoverSource(Protocol):
     def top_speed(self) -> float:
         """No mover is ever faster [m/s]."""
 
-    def draw(self, still: World, start: tuple[float, float, float], duration: float, seed: int,
-             generator: np.random.Generator) -> tuple[Movers, float]:
+    def draw(
+        self,
+        still: World,
+        start: tuple[float, float, float],
+        duration: float,
+        seed: int,
+        generator: np.random.Generator,
+    ) -> tuple[Movers, float]:
         """Movers for a world whose fixed things are known, and the episode's start time [s]."""
 
     def paced(self, top_speed: float) -> MoverSource:
@@ -39,8 +45,14 @@ class NobodyMoves:
 
     top_speed: float = 0.0
 
-    def draw(self, still: World, start: tuple[float, float, float], duration: float, seed: int,
-             generator: np.random.Generator) -> tuple[Movers, float]:
+    def draw(
+        self,
+        still: World,
+        start: tuple[float, float, float],
+        duration: float,
+        seed: int,
+        generator: np.random.Generator,
+    ) -> tuple[Movers, float]:
         return NoMovers(), 0.0
 
     def paced(self, top_speed: float) -> NobodyMoves:
@@ -63,11 +75,22 @@ class SplineSource:
     def top_speed(self) -> float:
         return self.speed[1]
 
-    def draw(self, still: World, start: tuple[float, float, float], duration: float, seed: int,
-             generator: np.random.Generator) -> tuple[Movers, float]:
+    def draw(
+        self,
+        still: World,
+        start: tuple[float, float, float],
+        duration: float,
+        seed: int,
+        generator: np.random.Generator,
+    ) -> tuple[Movers, float]:
         movers = draw_spline_movers(
-            self.count, self.radius, self.speed, still.bounds, still.clearance,
-            (start[0], start[1], self.keep_out), generator,
+            self.count,
+            self.radius,
+            self.speed,
+            still.bounds,
+            still.clearance,
+            (start[0], start[1], self.keep_out),
+            generator,
         )
         return movers, 0.0
 
@@ -93,8 +116,14 @@ class ScriptSource:
     def _movers(self) -> PathMovers:
         return PathMovers([np.array(p) for p in self.paths], np.array(self.radius))
 
-    def draw(self, still: World, start: tuple[float, float, float], duration: float, seed: int,
-             generator: np.random.Generator) -> tuple[Movers, float]:
+    def draw(
+        self,
+        still: World,
+        start: tuple[float, float, float],
+        duration: float,
+        seed: int,
+        generator: np.random.Generator,
+    ) -> tuple[Movers, float]:
         return self._movers, 0.0
 
     def paced(self, top_speed: float) -> ScriptSource:
@@ -133,13 +162,20 @@ class RecordingSource:
     def top_speed(self) -> float:
         return PathMovers(self.tracks, np.ones(len(self.tracks))).top_speed
 
-    def draw(self, still: World, start: tuple[float, float, float], duration: float, seed: int,
-             generator: np.random.Generator) -> tuple[Movers, float]:
+    def draw(
+        self,
+        still: World,
+        start: tuple[float, float, float],
+        duration: float,
+        seed: int,
+        generator: np.random.Generator,
+    ) -> tuple[Movers, float]:
         movers = recorded_movers(self.tracks, self.edge, still.outline, self.radius)
         return movers, self._start(movers, start, duration, seed)
 
-    def _start(self, movers: PathMovers, start: tuple[float, float, float], duration: float,
-               seed: int) -> float:
+    def _start(
+        self, movers: PathMovers, start: tuple[float, float, float], duration: float, seed: int
+    ) -> float:
         first = min(float(track[0, 0]) for track in self.tracks)
         last = max(float(track[-1, 0]) for track in self.tracks)
         if self.start_time is not None:

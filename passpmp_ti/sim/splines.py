@@ -20,8 +20,13 @@ class SplineMovers:
     times a disc has moved at most its speed times their difference, whatever the spline does.
     """
 
-    def __init__(self, control_points: Sequence[np.ndarray], radius: np.ndarray,
-                 speed: np.ndarray, phase: np.ndarray) -> None:
+    def __init__(
+        self,
+        control_points: Sequence[np.ndarray],
+        radius: np.ndarray,
+        speed: np.ndarray,
+        phase: np.ndarray,
+    ) -> None:
         """Lay closed splines through control points.
 
         Args:
@@ -69,9 +74,12 @@ def closed_spline(control_points: np.ndarray, pieces: int = PIECES) -> np.ndarra
 
 
 def draw_spline_movers(
-    count: int, radius: tuple[float, float], speed: tuple[float, float],
+    count: int,
+    radius: tuple[float, float],
+    speed: tuple[float, float],
     bounds: tuple[float, float, float, float],
-    clearance: Callable[[np.ndarray], np.ndarray], keep_out: tuple[float, float, float],
+    clearance: Callable[[np.ndarray], np.ndarray],
+    keep_out: tuple[float, float, float],
     generator: np.random.Generator,
 ) -> SplineMovers:
     """Draw discs on random closed B-splines that never touch what stays.
@@ -110,8 +118,11 @@ def draw_spline_movers(
 
 
 def _stays_clear(
-    control_points: np.ndarray, phase: float, radius: float,
-    bounds: tuple[np.ndarray, np.ndarray], clearance: Callable[[np.ndarray], np.ndarray],
+    control_points: np.ndarray,
+    phase: float,
+    radius: float,
+    bounds: tuple[np.ndarray, np.ndarray],
+    clearance: Callable[[np.ndarray], np.ndarray],
     keep_out: tuple[float, float, float],
 ) -> bool:
     curve = closed_spline(control_points)

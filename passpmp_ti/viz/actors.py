@@ -82,6 +82,7 @@ def draw_outline(robot: Robot, state: np.ndarray, plot: Plot) -> None:
         for centre, radius in discs:
             plot.disc(centre, radius, palette.ROBOT)
     aside = np.array([-ahead[1], ahead[0]])
-    mark = np.stack([0.75 * ahead, -0.45 * ahead + 0.45 * aside, -0.2 * ahead,
-                     -0.45 * ahead - 0.45 * aside])
+    mark = np.stack(
+        [0.75 * ahead, -0.45 * ahead + 0.45 * aside, -0.2 * ahead, -0.45 * ahead - 0.45 * aside]
+    )
     plot.fill(middle + size * mark, ink)

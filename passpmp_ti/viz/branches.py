@@ -72,8 +72,7 @@ def _rejected(tree: Tree) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return parents, controls, levels[depth[parents]]
 
 
-def _lines(tree: Tree, parents: np.ndarray, controls: np.ndarray,
-           steps: np.ndarray) -> np.ndarray:
+def _lines(tree: Tree, parents: np.ndarray, controls: np.ndarray, steps: np.ndarray) -> np.ndarray:
     """[n, points, 2] the motions from `parents` under `controls` [n, 3] for `steps` [n]."""
     model, count = tree.model, len(parents)
     longest_primitive = max((model.settings.cycle, *model.settings.primitives))

@@ -30,8 +30,9 @@ class Outcome:
     The video runs in real time. Snapshots lie evenly over the run, however long it gets.
     """
 
-    def __init__(self, folder: str | Path, heading: str, detail: str = "", *,
-                 video: bool = True) -> None:
+    def __init__(
+        self, folder: str | Path, heading: str, detail: str = "", *, video: bool = True
+    ) -> None:
         """Make the folder.
 
         Args:
@@ -148,9 +149,14 @@ def moment_of(info: CycleInfo, trail: np.ndarray) -> Moment:
     """What a picture needs of a cycle; `trail` [n, 2]: where the robot has been [m]."""
     moving = sum(c.moving for c in info.contacts)
     return Moment(
-        time=info.time, world=info.world, record=info.navigator.record,
-        robot=info.navigator.robot, state=info.state, trail=trail,
-        goals=tuple(info.navigator.goals), contacts_moving=moving,
+        time=info.time,
+        world=info.world,
+        record=info.navigator.record,
+        robot=info.navigator.robot,
+        state=info.state,
+        trail=trail,
+        goals=tuple(info.navigator.goals),
+        contacts_moving=moving,
         contacts_at_rest=len(info.contacts) - moving,
     )
 

@@ -42,8 +42,15 @@ class Entry:
     width: int = 2
 
 
-def draw(page: np.ndarray, place: tuple[int, int, int, int], below: bool, heading: str,
-         readings: Sequence[Reading], note: str, legend: Sequence[Entry]) -> int:
+def draw(
+    page: np.ndarray,
+    place: tuple[int, int, int, int],
+    below: bool,
+    heading: str,
+    readings: Sequence[Reading],
+    note: str,
+    legend: Sequence[Entry],
+) -> int:
     """Write readings, a note and the legend into a panel.
 
     Args:
@@ -83,8 +90,14 @@ def _heading(page: np.ndarray, x: int, y: int, width: int, words: str) -> int:
     return y + 24
 
 
-def _readings(page: np.ndarray, place: tuple[int, int, int], heading: str,
-              readings: Sequence[Reading], note: str, columns: int) -> int:
+def _readings(
+    page: np.ndarray,
+    place: tuple[int, int, int],
+    heading: str,
+    readings: Sequence[Reading],
+    note: str,
+    columns: int,
+) -> int:
     x, y, w = place
     top = _heading(page, x, y, w, heading)
     rows = -(-len(readings) // columns)
@@ -94,8 +107,9 @@ def _readings(page: np.ndarray, place: tuple[int, int, int], heading: str,
         base = top + (n % rows + 1) * ROW - 6
         text.draw(page, reading.name, (at_x, base), palette.MUTED, SIZE)
         ink = palette.EXECUTED if reading.alarm else palette.INK
-        text.draw(page, reading.value, (at_x + column, base), ink, SIZE,
-                  weight=text.HEADING, align=1.0)
+        text.draw(
+            page, reading.value, (at_x + column, base), ink, SIZE, weight=text.HEADING, align=1.0
+        )
     foot = top + rows * ROW + 4
     letters = max(12, w * 2 // SIZE)
     lines = textwrap.wrap(note, letters, max_lines=NOTE_LINES, placeholder=" ...")
@@ -104,8 +118,9 @@ def _readings(page: np.ndarray, place: tuple[int, int, int], heading: str,
     return foot + 19 * NOTE_LINES + 8
 
 
-def _legend(page: np.ndarray, place: tuple[int, int, int], legend: Sequence[Entry],
-            columns: int) -> int:
+def _legend(
+    page: np.ndarray, place: tuple[int, int, int], legend: Sequence[Entry], columns: int
+) -> int:
     x, y, w = place
     top = _heading(page, x, y, w, "Legend")
     rows = -(-len(legend) // columns)
@@ -125,8 +140,9 @@ def _swatch(page: np.ndarray, x: int, middle: int, entry: Entry) -> None:
         if entry.sign == HATCH:
             inner = page[middle - 8 : middle + 8, x : x + SWATCH]
             for offset in range(-16, SWATCH, 8):
-                cv2.line(inner, (offset, 16), (offset + 16, 0), palette.UNSEEN_HATCH, 1,
-                         cv2.LINE_AA)
+                cv2.line(
+                    inner, (offset, 16), (offset + 16, 0), palette.UNSEEN_HATCH, 1, cv2.LINE_AA
+                )
         cv2.rectangle(page, *box, palette.RULE, 1)
     elif entry.sign == LINE:
         cv2.line(page, (x, middle), (x + SWATCH, middle), entry.colour, entry.width, cv2.LINE_AA)
@@ -135,6 +151,7 @@ def _swatch(page: np.ndarray, x: int, middle: int, entry: Entry) -> None:
     else:
         turns = -np.pi / 2 + np.arange(10) * np.pi / 5
         radii = np.where(np.arange(10) % 2 == 0, 9.0, 4.0)
-        points = np.stack([x + SWATCH / 2 + radii * np.cos(turns),
-                           middle + radii * np.sin(turns)], axis=1)
+        points = np.stack(
+            [x + SWATCH / 2 + radii * np.cos(turns), middle + radii * np.sin(turns)], axis=1
+        )
         cv2.fillPoly(page, [np.round(points * 16).astype(np.int32)], entry.colour, cv2.LINE_AA, 4)

@@ -62,11 +62,11 @@ class Plot:
     def lines(self, polylines: np.ndarray, colour: Colour, width: int = 1) -> None:
         """Draw polylines of equal length, [n, m, 2]."""
         if len(polylines):
-            cv2.polylines(self.sheet, list(self._fixed(polylines)), False, colour, width,
-                          cv2.LINE_AA, SHIFT)
+            cv2.polylines(
+                self.sheet, list(self._fixed(polylines)), False, colour, width, cv2.LINE_AA, SHIFT
+            )
 
-    def disc(self, centre: np.ndarray, radius: float, colour: Colour,
-             *, width: int = -1) -> None:
+    def disc(self, centre: np.ndarray, radius: float, colour: Colour, *, width: int = -1) -> None:
         """A disc of `radius` metres; with `width` > 0 only its rim."""
         self._circle(centre, radius * self.scale, colour, width)
 
@@ -82,8 +82,9 @@ class Plot:
             rays = radii[:, None] * np.stack([np.cos(turns), np.sin(turns)], axis=1)
             self.fill(np.asarray(centre) + rays / self.scale, ink)
 
-    def region(self, inside: np.ndarray, origin: tuple[float, float], cell: float,
-               colour: Colour) -> None:
+    def region(
+        self, inside: np.ndarray, origin: tuple[float, float], cell: float, colour: Colour
+    ) -> None:
         """Paint the cells of a grid.
 
         Args:

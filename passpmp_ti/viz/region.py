@@ -40,8 +40,9 @@ class Region:
         return float(chosen.mean()) if chosen.size else 0.0
 
 
-def braking_ics(model: FutureModel, bounds: Bounds, heading: float, speed: float, time: float,
-                count: int) -> Region:
+def braking_ics(
+    model: FutureModel, bounds: Bounds, heading: float, speed: float, time: float, count: int
+) -> Region:
     """Check the states of one heading and speed all over a view, in one launch.
 
     Args:

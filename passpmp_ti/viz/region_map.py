@@ -48,8 +48,14 @@ class RegionMap:
     """P-safe share of the states at places that the scan has seen."""
 
 
-def region_map(scenario: Scenario, speed: float, heading: float | None = None, *, seed: int = 0,
-               after: float = 0.0) -> RegionMap:
+def region_map(
+    scenario: Scenario,
+    speed: float,
+    heading: float | None = None,
+    *,
+    seed: int = 0,
+    after: float = 0.0,
+) -> RegionMap:
     """Scan once from the start and check the states all over the view.
 
     Args:
@@ -78,8 +84,14 @@ def region_map(scenario: Scenario, speed: float, heading: float | None = None, *
     apart = np.linalg.norm(region.places() - state[:2], axis=-1)
     in_range = apart <= max(lidar.range_max for lidar in scenario.lidars)
     return RegionMap(
-        scenario=scenario, world=world, state=state, model=model, region=region, time=time,
-        share_of_view=region.share(), share_in_range=region.share(in_range),
+        scenario=scenario,
+        world=world,
+        state=state,
+        model=model,
+        region=region,
+        time=time,
+        share_of_view=region.share(),
+        share_in_range=region.share(in_range),
         share_of_seen=region.share(region.seen),
     )
 
@@ -89,8 +101,10 @@ def draw_region_map(found: RegionMap) -> np.ndarray:
     scenario, region = found.scenario, found.region
     canvas = Canvas(scenario.bounds)
     settings = scenario.settings
-    canvas.title(scenario.name, f"braking ICS · objects ≤ {settings.object_speed:g} m/s"
-                                f" · cycle {settings.cycle:g} s")
+    canvas.title(
+        scenario.name,
+        f"braking ICS · objects ≤ {settings.object_speed:g} m/s · cycle {settings.cycle:g} s",
+    )
     canvas.region(~region.safe, region.origin, region.cell, palette.ICS)
     shade_unseen(found.model, canvas)
     draw_world(found.world, found.model.stamp, canvas)

@@ -91,9 +91,11 @@ def summary_table(summaries: list[Mapping[str, Any]]) -> str:
 def map_report(found: RegionMap) -> str:
     """The p-safe shares of a map."""
     region = found.region
-    shares = (("of the view", found.share_of_view),
-              ("within the scan's range", found.share_in_range),
-              ("of what the scan saw", found.share_of_seen))
+    shares = (
+        ("of the view", found.share_of_view),
+        ("within the scan's range", found.share_in_range),
+        ("of what the scan saw", found.share_of_seen),
+    )
     return (
         f"{found.scenario.name}: p-safe states at {region.speed:g} m/s, heading"
         f" {math.degrees(region.heading):.0f} deg, objects of at most"

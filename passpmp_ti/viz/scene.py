@@ -80,8 +80,15 @@ def draw_cycle(moment: Moment, canvas: Canvas, *, region_states: int = 20_000) -
     region = _region(moment, canvas.bounds, region_states)
     _paint(moment, canvas, region, branches)
     (x, y, w, h), below = canvas.layout.panel, canvas.layout.panel_below
-    foot = panel.draw(canvas.page, (x, y, w, h), below, "This cycle", _readings(moment),
-                      moment.record.lost_scan or moment.record.reason, _legend(moment, region))
+    foot = panel.draw(
+        canvas.page,
+        (x, y, w, h),
+        below,
+        "This cycle",
+        _readings(moment),
+        moment.record.lost_scan or moment.record.reason,
+        _legend(moment, region),
+    )
     side = min(w, y + h - foot - panel.CLOSE_UP_HEAD)
     if side >= LEAST_CLOSE_UP:
         half = 0.5 * side / (MAGNIFY * canvas.scale)
@@ -156,8 +163,11 @@ def _readings(moment: Moment) -> list[Reading]:
         Reading("time", f"{moment.time:.1f} s"),
         Reading("speed", f"{float(moment.robot.speed(moment.state)):.2f} m/s"),
         Reading("to the goal", f"{away:.1f} m"),
-        Reading("decision", DECISIONS.get(record.decision, record.decision),
-                alarm=record.decision == "brake"),
+        Reading(
+            "decision",
+            DECISIONS.get(record.decision, record.decision),
+            alarm=record.decision == "brake",
+        ),
         Reading("tree nodes", nodes),
         Reading("cycle took", f"{1e3 * record.timings.get('total', 0.0):.0f} ms"),
         Reading("contacts while moving", str(moment.contacts_moving), moment.contacts_moving > 0),
@@ -173,6 +183,4 @@ def _legend(moment: Moment, region: Region | None) -> list[Entry]:
         label = "braking ICS (none at rest)"
     else:
         label = "braking ICS (not drawn)"
-    return [
-        Entry(e.sign, e.colour, label) if e.colour == palette.ICS else e for e in ENTRIES
-    ]
+    return [Entry(e.sign, e.colour, label) if e.colour == palette.ICS else e for e in ENTRIES]

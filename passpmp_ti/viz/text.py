@@ -36,8 +36,16 @@ def width(text: str, size: int, weight: int = BODY) -> int:
     return int(cv2.getTextSize((0, 0), text, (0, 0), face, size, weight)[2])
 
 
-def draw(image: np.ndarray, text: str, at: tuple[float, float], colour: Colour, size: int,
-         *, weight: int = BODY, align: float = 0.0) -> None:
+def draw(
+    image: np.ndarray,
+    text: str,
+    at: tuple[float, float],
+    colour: Colour,
+    size: int,
+    *,
+    weight: int = BODY,
+    align: float = 0.0,
+) -> None:
     """Write a line of text.
 
     Args:
@@ -54,7 +62,15 @@ def draw(image: np.ndarray, text: str, at: tuple[float, float], colour: Colour, 
     face = _face()
     if face is None:
         thickness = 2 if weight >= HEADING else 1
-        cv2.putText(image, _plain(text), (x, y), cv2.FONT_HERSHEY_SIMPLEX, size / STROKE_SIZE,
-                    colour, thickness, cv2.LINE_AA)
+        cv2.putText(
+            image,
+            _plain(text),
+            (x, y),
+            cv2.FONT_HERSHEY_SIMPLEX,
+            size / STROKE_SIZE,
+            colour,
+            thickness,
+            cv2.LINE_AA,
+        )
     else:
         cv2.putText(image, text, (x, y), colour, face, size, weight)

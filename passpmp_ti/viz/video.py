@@ -15,8 +15,18 @@ import numpy as np
 
 from passpmp_ti import door
 
-H264 = ("-c:v", "libx264", "-preset", "veryfast", "-crf", "23", "-pix_fmt", "yuv420p",
-        "-movflags", "+faststart")
+H264 = (
+    "-c:v",
+    "libx264",
+    "-preset",
+    "veryfast",
+    "-crf",
+    "23",
+    "-pix_fmt",
+    "yuv420p",
+    "-movflags",
+    "+faststart",
+)
 
 
 def ffmpeg() -> str | None:
@@ -90,8 +100,12 @@ class VideoWriter:
     def __enter__(self) -> VideoWriter:
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None,
-                 trace: TracebackType | None) -> None:
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
         self.close()
 
 
@@ -103,14 +117,27 @@ class _Sink(Protocol):
 
 class _Pipe:
     def __init__(self, program: str, path: Path, size: tuple[int, int], fps: float) -> None:
-        raw = ("-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{size[0]}x{size[1]}",
-               "-r", f"{fps:g}", "-i", "-")
+        raw = (
+            "-f",
+            "rawvideo",
+            "-pix_fmt",
+            "rgb24",
+            "-s",
+            f"{size[0]}x{size[1]}",
+            "-r",
+            f"{fps:g}",
+            "-i",
+            "-",
+        )
         command = [program, "-y", "-loglevel", "error", *raw, "-an", *H264, str(path)]
         # a file, not a pipe: nobody reads it while frames are written
         self._words: IO[bytes] = tempfile.TemporaryFile()  # noqa: SIM115
         # a group of its own: Ctrl-C ends the drive, and the video is still finished
         self._process = subprocess.Popen(
-            command, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=self._words,
+            command,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.DEVNULL,
+            stderr=self._words,
             start_new_session=True,
         )
 

@@ -1,0 +1,182 @@
+"""Each margin is needed: with all of them nothing breaks a proof, without one of them attacks work.
+
+A small robot on a fine grid, so that one margin is not hidden behind another. The order is always
+the same: the claim is what the model proves of states; the truth is what `oracle` then does.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from oracle import attack, exact
+
+import passpmp_ti.grid.model as model_module
+import passpmp_ti.settings as settings_module
+from passpmp_ti import DifferentialDrive, Scan, Settings
+from passpmp_ti.grid.distance import distance_to_zeros
+from passpmp_ti.kernels.beams import SLACK
+
+MOUSE = DifferentialDrive(discs=((0.0, 0.1),), wheel_speed=2.0, acceleration=4.0, track=1.5)
+HERE = (0.37, -0.21, 0.4)
+BOXES = [
+    exact.box(1.5, 0.6, 0.5, 0.7, 0.9),
+    exact.box(-0.9, 1.1, 0.6, 0.6, 0.2),
+    exact.box(0.5, -1.6, 1.4, 0.5, 2.0),
+]
+DISCS = [(-1.4, -0.9, 0.3), (2.2, -0.8, 0.25)]
+WORLD = exact.world_of(BOXES, DISCS)
+WALLS_ONLY = exact.world_of(BOXES)
+FINE = Settings(cell=0.02, object_width=0.4, object_speed=0.0, time_step=0.02)
+
+
+def seen(world, settings, beams=720, range_max=2.5, robot=MOUSE):
+    """What one lidar at HERE shows of `world`."""
+    scan = exact.sweep(world, HERE, beams, 2 * np.pi, range_max, 10.0)
+    return attack.Case(robot, settings, world, [scan], HERE)
+
+
+def states_beside(case, count, generator):
+    """(states, times): a third anywhere, a third beside a box, a third about to pass a corner."""
+    states, times = attack.random_states(case, count, generator)
+    radius, top = case.robot.disc_radius, case.robot.wheel_speed
+    third = count // 3
+    edges = case.world.edges[generator.integers(0, len(case.world.edges), third)]
+    side = edges[:, 1] - edges[:, 0]
+    outward = np.stack([side[:, 1], -side[:, 0]], axis=1)
+    outward /= np.linalg.norm(outward, axis=1)[:, None]
+    share, apart = generator.random((third, 1)), generator.uniform(-0.02, 0.2, (third, 1))
+    states[:third, :2] = edges[:, 0] + share * side + (radius + apart) * outward
+    heading = states[third : 2 * third, 2]
+    ahead = np.stack([np.cos(heading), np.sin(heading)], axis=1)
+    left = np.stack([-ahead[:, 1], ahead[:, 0]], axis=1)
+    before, beside = generator.uniform(0, 0.8, (third, 1)), generator.uniform(0, radius, (third, 1))
+    states[third : 2 * third, :2] = edges[:, 0] - before * ahead + beside * left
+    states[third : 2 * third, 3:5] = generator.uniform(0.6, 1, (third, 2)) * top
+    return states, times
+
+
+def broken(claim, truth=None, shift=(0.0, 0.0), attackers=0, later=0.0, seeds=3, width=None):
+    """How many proofs of `claim` fail in `truth`.
+
+    Args:
+        claim: the case that the model is made of.
+        truth: the case as it is; None: the same.
+        shift: from where a robot was claimed to be to where it is [m].
+        attackers: hidden discs a seed; 0: only the boxes are there to be hit.
+        later: how much older than its stamp the scan is [s].
+        width: of the narrowest attacker; None: as declared.
+    """
+    truth = truth or claim
+    model = claim.model()
+    count = 0
+    braking = claim.robot.braking
+    for seed in range(seeds):
+        generator = np.random.default_rng(seed)
+        states, times = states_beside(truth, 2000, generator)
+        hidden = (np.zeros((0, 2)), np.zeros(0))
+        if attackers:
+            sized = truth.settings.changed(object_width=width or truth.settings.object_width)
+            hidden = exact.hidden_discs(
+                truth.scans, truth.world, truth.body, sized, attackers, generator
+            )
+        proof = model.proving_brakes(states, times)
+        true_states = states + np.array([*shift, 0, 0, 0])
+        for k, control in enumerate(braking):
+            mine = proof == k
+            count += attack.breaks(
+                truth, true_states[mine], times[mine] + later, control, hidden
+            ).sum()
+    return count
+
+
+def test_the_motion_between_samples(monkeypatch):
+    # samples up to 0.8 m apart: a robot of 0.2 m may pass a corner between two of them
+    steady = replace(MOUSE, acceleration=2.0, track=4.0)
+    settings = FINE.changed(time_step=0.4, cycle=0.4, primitives=(0.4,))
+    case = seen(WALLS_ONLY, settings, robot=steady)
+    assert broken(case) == 0
+    monkeypatch.setattr(settings_module, "motion_margin", lambda robot, step: 0.0)
+    assert broken(case) > 0
+
+
+def test_the_extent_of_cells(monkeypatch):
+    case = seen(WALLS_ONLY, FINE.changed(cell=0.2))
+    assert broken(case) == 0
+    monkeypatch.setattr(model_module, "distance_between_cells", distance_to_zeros)
+    assert broken(case) > 0
+
+
+def test_the_corner_that_stands_out_between_two_beams(monkeypatch):
+    # a corner that looks at the sensor, in the middle between two of 24 beams
+    bearing = HERE[2] + 2.5 * np.pi / 12
+    middle = 1.4 + 0.4 * np.sqrt(2)
+    corner = exact.box(
+        HERE[0] + middle * np.cos(bearing), HERE[1] + middle * np.sin(bearing), 0.8, 0.8,
+        bearing + np.pi / 4,
+    )  # fmt: skip
+    case = seen(exact.world_of([corner]), FINE, beams=24)
+    assert broken(case) == 0
+    views_of = model_module.views_of
+
+    def without_half_chord(*arguments):
+        views = views_of(*arguments)
+        proven = views.reach[0] > 0
+        views.reach[0, proven] = (views.reach[0, proven] + SLACK) / (1 - 0.5 * views.view[0, 3])
+        return views
+
+    monkeypatch.setattr(model_module, "views_of", without_half_chord)
+    assert broken(case) > 0
+
+
+def test_the_width_of_objects():
+    # 0.2 m wide things slip between beams that 0.4 m wide ones cannot slip between
+    believed = seen(WORLD, FINE.changed(object_width=0.4), beams=40, range_max=4.0)
+    honest = seen(WORLD, FINE.changed(object_width=0.2), beams=40, range_max=4.0)
+    assert broken(honest, attackers=1000, width=0.2) == 0
+    assert broken(believed, attackers=1000, width=0.2) > 0
+
+
+def test_the_noise_of_ranges():
+    noise = 0.08
+    truth = seen(WALLS_ONLY, FINE)
+    (scan,) = truth.scans
+    longer = Scan(
+        scan.ranges + noise, scan.angle_min, scan.angle_increment, scan.range_max, scan.pose,
+        scan.stamp, scan.moving,
+    )  # fmt: skip
+    careless = replace(truth, scans=[longer])
+    careful = replace(careless, settings=FINE.changed(range_noise=noise))
+    assert broken(careful, truth) == 0
+    assert broken(careless, truth) > 0
+
+
+def test_the_error_of_localisation():
+    # the scan is believed to be 0.04 m to the left of where it was, the robot 0.04 m to the right
+    error = 0.04
+    truth = seen(WALLS_ONLY, FINE)
+    (scan,) = truth.scans
+    believed = (HERE[0] - error, *HERE[1:])
+    moved = Scan(
+        scan.ranges, scan.angle_min, scan.angle_increment, scan.range_max, believed, scan.stamp,
+        scan.moving,
+    )  # fmt: skip
+    careless = replace(truth, scans=[moved], position=believed)
+    careful = replace(careless, settings=FINE.changed(localisation_error=error))
+    assert broken(careful, truth, shift=(-error, 0)) == 0
+    assert broken(careless, truth, shift=(-error, 0)) > 0
+
+
+@pytest.mark.parametrize("shift", [(0.15, 0.0), (0.0, -0.15)])
+def test_the_error_of_tracking(shift):
+    case = seen(WALLS_ONLY, FINE)
+    careful = replace(case, settings=FINE.changed(tracking_error=0.15))
+    assert broken(careful, case, shift) == 0
+    assert broken(case, case, shift) > 0
+
+
+def test_the_age_of_a_scan_that_its_stamp_does_not_tell():
+    late = 0.1
+    case = seen(WORLD, FINE.changed(object_speed=2.0))
+    careful = replace(case, settings=case.settings.changed(stamp_error=late))
+    assert broken(careful, attackers=300, later=late) == 0
+    assert broken(case, attackers=300, later=late) > 0
