@@ -14,16 +14,16 @@ from passpmp_ti.kernels.guide import UNREACHED, guide_costs, point_ahead, sweep
 from passpmp_ti.robots import Robot
 from passpmp_ti.settings import Settings
 
-MOST_CELLS = 320
-"""Cells along the longer side of the guide's grid: it is swept every cycle."""
+MOST_CELLS = 70_000
+"""Cells of the guide's grid: it is swept every cycle."""
 SLOWEST_SHARE = 1 / 12
 """Of the cruise speed, where something may step out at any moment."""
 WALL_SHARE = 1 / 300
 """Of the cruise speed, inside walls: finite, so that every place has a way down."""
 MOST_ROUNDS = 12
-AROUND = 48
+AROUND = 56
 """Cells about the robot in which the way ahead is worked out."""
-AHEAD = 10
+AHEAD = 14
 """Cells down the field at which the way ahead is read."""
 
 
@@ -72,7 +72,7 @@ class Guide:
         pad = 0.4 * sensor_reach
         self._low = places.min(axis=0) - pad
         extent = places.max(axis=0) + pad - self._low
-        self._cell = max(2 * settings.cell, float(extent.max()) / MOST_CELLS)
+        self._cell = max(settings.cell, math.sqrt(float(extent.prod()) / MOST_CELLS))
         columns, rows = (int(n) for n in np.ceil(extent / self._cell) + 1)
         self._walls = np.ones((rows, columns), dtype=np.uint8)
         if static_map is not None:
@@ -131,7 +131,9 @@ class Guide:
             spare = room / settings.object_speed - 2 * settings.cycle
             deceleration = float(robot.parameters()[4])
             speed = np.clip(deceleration * spare, SLOWEST_SHARE * cruise, cruise)
-        blocked = distance_to_zeros(self._walls) * self._cell < clearance + 0.5 * self._cell
+        # the model keeps up to a cell more from a wall than the clearance
+        kept = clearance + settings.cell + 0.5 * self._cell
+        blocked = distance_to_zeros(self._walls) * self._cell < kept
         speed[blocked] = WALL_SHARE * cruise
         return speed
 
