@@ -78,6 +78,10 @@ class Robot:
         """About how long a turn by a right angle takes [s]; for the guide only."""
         raise NotImplementedError
 
+    def integration_error(self, time_step: float) -> float:
+        """Bound on what the midpoint rule is off by over the longest braking [m]."""
+        raise NotImplementedError
+
     def parameters(self) -> np.ndarray:
         """[6] float32, what the motion kernels need of this robot (see kernels/motion.py)."""
         raise NotImplementedError
@@ -168,6 +172,19 @@ class CarLike(Robot):
         speed = min(self.v_max, math.sqrt(self.acceleration * radius))
         return 0.5 * math.pi * radius / speed + self.xi_max / self.xi_rate
 
+    def integration_error(self, time_step: float) -> float:
+        # theta' = v tan(xi) / L. A step's error is dt^3 / 24 of its second derivative, and once
+        # dt^2 / 4 of the jump of its first where the steering stops; the position is off by the
+        # heading's error times the way, and by the chord of each step's arc.
+        v, a, dt = self.v_max, self.acceleration, time_step
+        slope = self.xi_rate / math.cos(self.xi_max) ** 2
+        bend = 2 * math.tan(self.xi_max) * slope * self.xi_rate
+        second = (v * bend + 2 * a * slope) / self.wheelbase
+        heading = second * dt**2 / 24 * self.longest_braking
+        heading += v * slope / self.wheelbase * dt**2 / 4
+        way = v * v / (2 * a)
+        return way * (heading + (self.top_turn_rate * dt) ** 2 / 24)
+
     def parameters(self) -> np.ndarray:
         return np.array(
             [self.v_max, -self.v_reverse, self.xi_max, 0.5 / self.wheelbase, self.acceleration, 0],
@@ -227,6 +244,16 @@ class DifferentialDrive(Robot):
     def turn_time(self) -> float:
         # on the spot: half of it speeding up, half of it slowing down
         return 2 * math.sqrt(0.5 * math.pi * self.track / (2 * self.acceleration))
+
+    def integration_error(self, time_step: float) -> float:
+        # Wheel speeds are linear, so the heading is exact but in the step in which a wheel stops;
+        # each step's arc is off by way (turn)^2 / 24. Way and turn share the wheels' speed: their
+        # product is greatest at a third of the top speed.
+        v, a, dt = self.wheel_speed, self.acceleration, time_step
+        turning = v / 3 * (2 / 3 * self.top_turn_rate) ** 2 * dt**2 / 24
+        way = v * self.longest_braking / 2
+        stops = 2 * a / self.track * dt**2 / 4
+        return turning * self.longest_braking / 2 + way * stops
 
     def parameters(self) -> np.ndarray:
         return np.array(

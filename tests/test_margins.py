@@ -12,7 +12,7 @@ from oracle import attack, exact
 
 import passpmp_ti.grid.model as model_module
 import passpmp_ti.settings as settings_module
-from passpmp_ti import DifferentialDrive, Scan, Settings
+from passpmp_ti import DifferentialDrive, FutureModel, Scan, Settings
 from passpmp_ti.grid.distance import distance_to_zeros
 from passpmp_ti.kernels.beams import SLACK
 
@@ -148,6 +148,29 @@ def test_the_noise_of_ranges():
     careful = replace(careless, settings=FINE.changed(range_noise=noise))
     assert broken(careful, truth) == 0
     assert broken(careless, truth) > 0
+
+
+def test_noise_may_not_shut_a_gap_that_an_object_fits_through():
+    # 0.45 m between a box and the wall behind it; with ranges 0.05 m wrong it looks like 0.35 m
+    noise = 0.05
+    dot = DifferentialDrive(discs=((0.0, 0.05),), wheel_speed=2.0, acceleration=4.0, track=1.5)
+    settings = FINE.changed(object_speed=1.0, range_noise=noise)
+    world = exact.world_of([exact.box(2.2, -1.3, 0.4, 2.0), exact.box(3.15, 0.0, 0.6, 6.0)])
+    true = exact.sweep(world, (0.0, 0.0, 0.0), 720, 2 * np.pi, 6.0, 10.0)
+    error = np.where(true.points()[:, 0] > 2.8, -noise, noise)
+    ranges = true.ranges.copy()
+    ranges[true.returned] += error
+    scan = Scan(
+        ranges, true.angle_min, true.angle_increment, true.range_max, true.pose, true.stamp,
+        true.moving,
+    )  # fmt: skip
+    hidden = (np.array([[2.64, -0.8]]), np.array([0.2]))
+    place, later = np.array([[2.58, 0.6]]), np.array([1.2])
+    assert exact.consistent(true, *hidden).all()
+    assert exact.reaches(place, later, hidden, dot.disc_radius, 1.0, world).all()
+    model = FutureModel.from_scan(scan, dot, settings)
+    assert not model.occupied(place, [model.stamp]).any()
+    assert model.occupied(place, model.stamp + later).all()
 
 
 def test_the_error_of_localisation():

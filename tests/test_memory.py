@@ -116,8 +116,12 @@ def test_a_person_within_the_bound_breaks_no_premise():
 def test_memory_of_weaker_assumptions_is_refused():
     before = model_at((0.0, 0.0, 0.0), 0.0)
     for change in (
-        dict(object_speed=2.0), dict(tracking_error=0.1), dict(cell=0.1), dict(object_width=0.2),
-        dict(range_noise=0.1), dict(stamp_error=0.1),
+        dict(object_speed=2.0),
+        dict(tracking_error=0.1),
+        dict(cell=0.1),
+        dict(object_width=0.2),
+        dict(range_noise=0.1),
+        dict(stamp_error=0.1),
     ):
         with pytest.raises(ValueError, match="start without memory"):
             model_at((0.0, 0.0, 0.0), 0.1, previous=before, settings=SETTINGS.changed(**change))

@@ -181,7 +181,9 @@ def test_a_world_of_lost_beams_is_occupied_everywhere():
 
 def random_scan(seed, **more):
     generator = np.random.default_rng(seed)
-    boxes = [exact.box(*generator.uniform(-3, 3, 2), 0.8, 0.6, generator.random()) for _ in range(2)]
+    boxes = [
+        exact.box(*generator.uniform(-3, 3, 2), 0.8, 0.6, generator.random()) for _ in range(2)
+    ]
     discs = [(*generator.uniform(-3, 3, 2), 0.3) for _ in range(3)]
     away = [b for b in boxes if exact.box_distance(np.zeros((1, 2)), exact.world_of([b]))[0] > 0.5]
     return scan_of(away, [d for d in discs if np.hypot(*d[:2]) > 0.8], range_max=4.0, **more)
@@ -316,9 +318,7 @@ def test_a_declared_clearing_and_still_blind_bearings_let_it_move():
 
 
 def test_a_clearing_beyond_the_window_is_no_proof_that_nothing_comes_in():
-    settings = Settings(
-        cell=0.05, window=64, object_speed=1.0, object_width=0.4, clear_radius=3.0
-    )
+    settings = Settings(cell=0.05, window=64, object_speed=1.0, object_width=0.4, clear_radius=3.0)
     model = model_of(scan_of(range_max=1.0), settings)
     # the window ends 1.6 m from the robot: something may come from there
     assert arrival(model, 0.02, 0.02) <= 1.6

@@ -66,7 +66,9 @@ def extreme_states(robot, generator, count=40):
     states = np.zeros((count, 5))
     states[:, 2] = generator.uniform(-np.pi, np.pi, count)
     at_limits = generator.random((count, 2)) < 0.5
-    share = np.where(at_limits, generator.choice([-1, 1], (count, 2)), generator.uniform(-1, 1, (count, 2)))
+    share = np.where(
+        at_limits, generator.choice([-1, 1], (count, 2)), generator.uniform(-1, 1, (count, 2))
+    )
     limits = (robot.v_max, robot.xi_max) if robot.kind == exact.CAR else (robot.wheel_speed,) * 2
     states[:, 3:5] = share * limits
     return states
@@ -74,7 +76,8 @@ def extreme_states(robot, generator, count=40):
 
 @pytest.mark.parametrize("time_step", [0.02, 0.04, 0.1])
 @pytest.mark.parametrize(
-    "robot", [CAR, CHAIR, DifferentialDrive(track=0.3, wheel_speed=2.0), CarLike(xi_max=0.9, xi_rate=2.0)],
+    "robot",
+    [CAR, CHAIR, DifferentialDrive(track=0.3, wheel_speed=2.0), CarLike(xi_max=0.9, xi_rate=2.0)],
     ids=["car", "chair", "narrow chair", "agile car"],
 )
 def test_a_braking_path_stays_within_the_integration_margin(robot, time_step):
@@ -139,8 +142,11 @@ def test_a_car_at_rest_may_leave_either_way():
 @pytest.mark.parametrize("robot", [CAR, CHAIR], ids=["car", "chair"])
 def test_backwards_is_forwards_seen_in_a_mirror(robot):
     # a car's steering mirrors in itself; the wheels of a chair change places
-    state, back = ([0, 0, 0, 4.0, 0.2], [0, 0, 0, -4.0, 0.2]) if robot is CAR else (
-        [0, 0, 0, 2.0, 1.0], [0, 0, 0, -2.0, -1.0])
+    state, back = (
+        ([0, 0, 0, 4.0, 0.2], [0, 0, 0, -4.0, 0.2])
+        if robot is CAR
+        else ([0, 0, 0, 2.0, 1.0], [0, 0, 0, -2.0, -1.0])
+    )
     control = robot.braking[0]
     there = traced(robot, state, control, 0.02, UNTIL_REST)[0]
     away = traced(robot, back, control, 0.02, UNTIL_REST)[0]

@@ -123,7 +123,8 @@ def advanced(case, c, rho, most, generator):
     left = np.ones(len(c), dtype=bool)
     toward = np.array(case.position[:2]) - c
     toward /= np.linalg.norm(toward, axis=1)[:, None]
-    for share, turn in ((1, 0), (1, 0.8), (1, -0.8), (0.5, 0), (0.2, 0), (0, 0), (1, 1.6), (1, -1.6)):
+    moves = ((1, 0), (1, 0.8), (1, -0.8), (0.5, 0), (0.2, 0), (0, 0), (1, 1.6), (1, -1.6))
+    for share, turn in moves:
         spin = np.array([[np.cos(turn), np.sin(turn)], [-np.sin(turn), np.cos(turn)]])
         index = np.flatnonzero(left)
         to = c[index] + share * most * toward[index] @ spin
@@ -161,6 +162,8 @@ def test_most_states_that_nobody_can_attack_are_proven_safe():
         claimed = model.passively_safe(states, times)
         unattacked += int(safe.sum())
         agreed += int((safe & claimed).sum())
-    print(f"{agreed} of {unattacked} states that no attacker broke are proven: "
-          f"{agreed / unattacked:.3f}")
+    print(
+        f"{agreed} of {unattacked} states that no attacker broke are proven: "
+        f"{agreed / unattacked:.3f}"
+    )
     assert agreed > 0.5 * unattacked

@@ -5,11 +5,14 @@ import pytest
 from oracle import exact
 
 from passpmp_ti import CarLike, DifferentialDrive, FutureModel, Settings
+from passpmp_ti.kernels.tree import FIRST
 from passpmp_ti.planner.guide import Guide
 from passpmp_ti.planner.tree import ROOT, TreeGrower
 
 CHAIR, CAR = DifferentialDrive(), CarLike()
-CHAIR_SETTINGS = Settings.for_robot(CHAIR, object_speed=0.5, cell=0.1, capacity=3000)
+CHAIR_SETTINGS = Settings.for_robot(
+    CHAIR, object_speed=0.5, cell=0.1, capacity=3000, primitives=(0.4, 0.6)
+)
 CAR_SETTINGS = Settings.for_robot(CAR, object_speed=3.0, cell=0.5, capacity=3000)
 CLUTTER = exact.world_of(
     [exact.box(3.0, 1.5, 1.0, 1.0, 0.4), exact.box(2.0, -2.4, 2.0, 0.6, 0.1)], [(4.5, -0.4, 0.3)]
@@ -87,32 +90,26 @@ def test_what_brakes_ends_at_rest_and_is_a_leaf(tree):
     assert np.isin(braked, tree.leaves).all()
 
 
-def test_rejected_primitives_are_not_those_of_nodes(tree):
-    unsafe = tree.rejected
-    inner = np.setdiff1d(np.arange(tree.count), tree.leaves)
-    tried = len(inner) * len(tree.model.robot.controls)
-    kept = (~tree.braking).sum() - 1
-    assert 0 < len(unsafe)
-    # a node that could only brake had all its primitives rejected
-    assert len(unsafe) >= tried - kept - tree.braking.sum() * 0
+def test_each_control_of_a_node_is_either_a_child_or_rejected(tree):
+    assert tree.stopped_by == "depth"
+    tried = (~tree.braking & (tree.link[:, FIRST] >= 0)).sum() * len(tree.model.robot.controls)
+    children = (~tree.braking).sum() - 1
+    assert len(tree.rejected) == tried - children > 0
 
 
 def test_a_node_without_a_safe_child_gets_the_braking_that_proved_it():
-    # towards a wall so fast that nothing but braking is left
+    # a robot that can only speed up: near a wall nothing but braking is left
+    hasty = DifferentialDrive()
+    object.__setattr__(hasty, "controls", (hasty.controls[0],))
     wall = exact.world_of([exact.box(3.5, 0.0, 1.0, 8.0)])
-    settings = CHAIR_SETTINGS.changed(object_speed=0.0, cell=0.05)
-    speeds = [s for s in np.arange(0.5, 3.0, 0.05)]
-    last = None
-    for speed in speeds:
-        tree = grown(CHAIR, settings, wall, (0.0, 0.0, 0.0, speed, speed))
-        if tree.link[ROOT, 4] >= 0:
-            last = tree
-    assert last is not None
-    assert last.braking.any()
-    for node in np.flatnonzero(last.braking):
-        siblings = np.flatnonzero(last.parent == last.parent[node])
-        assert list(siblings) == [node]
-        assert not CHAIR.at_rest(last.states[last.parent[node]])
+    settings = CHAIR_SETTINGS.changed(object_speed=0.0, cell=0.05, primitives=(0.4, 0.6, 1.0, 1.0))
+    tree = grown(hasty, settings, wall, (0.0, 0.0, 0.0, 1.0, 1.0))
+    (last,) = np.flatnonzero(tree.braking)
+    assert last == tree.count - 1 >= 2
+    assert tree.parent[last] == last - 1
+    assert not hasty.at_rest(tree.states[last - 1])
+    assert hasty.at_rest(tree.states[last])
+    assert tree.stopped_by == "unsafe"
 
 
 def test_the_same_bytes_on_two_runs():

@@ -112,7 +112,7 @@ class FutureModel:
         ]
         views = views_of(
             scans,
-            _empty_discs(robot, settings, position, previous is None),
+            _empty_discs(robot, settings, position, window, previous is None),
             settings,
             window.anchor,
             reach_of,
@@ -286,13 +286,29 @@ def _check_previous(previous: FutureModel, robot: Robot, settings: Settings, sta
             f"{owner} has cells of {previous.cell:g} m, settings.cell is {settings.cell:g} m;"
             " start without memory"
         )
-    if previous.settings.object_speed < settings.object_speed or (
-        previous.settings.clearance(robot) < settings.clearance(robot)
-    ):
+    weaker = [
+        name
+        for name, before, now in _assumptions(previous.settings, settings, robot)
+        if before < now - 1e-12
+    ]
+    if weaker:
         raise ValueError(
-            f"{owner} assumed slower objects or smaller margins than settings now do; what it"
-            " proved does not hold any more: start without memory"
+            f"{owner} assumed less of the world than settings now do ({', '.join(weaker)}); what"
+            " it proved does not hold any more: start without memory"
         )
+
+
+def _assumptions(before: Settings, now: Settings, robot: Robot) -> list[tuple[str, float, float]]:
+    """(name, then, now) of what a model rests on; memory of a smaller value proves too much."""
+    return [
+        ("object_speed", before.object_speed, now.object_speed),
+        ("blind_speed", before.unseen_speed, now.unseen_speed),
+        ("object_width", -before.object_width, -now.object_width),
+        ("range_noise", before.range_noise, now.range_noise),
+        ("stamp_error", before.stamp_error, now.stamp_error),
+        ("map_tolerance", -before.map_tolerance, -now.map_tolerance),
+        ("clearance", before.clearance(robot), now.clearance(robot)),
+    ]
 
 
 def _window_for(
@@ -314,7 +330,11 @@ def _window_for(
 
 
 def _empty_discs(
-    robot: Robot, settings: Settings, position: tuple[float, float, float], first: bool
+    robot: Robot,
+    settings: Settings,
+    position: tuple[float, float, float],
+    window: Window,
+    first: bool,
 ) -> list[tuple[float, float, float]]:
     """Where nobody else can be: inside the robot's own body, and what is declared clear."""
     x, y, theta = position
@@ -323,7 +343,8 @@ def _empty_discs(
         for offset, radius in robot.discs
     ]
     if first and settings.clear_radius > 0:
-        discs.append((x, y, settings.clear_radius))
+        # its border must lie in the window: what comes in over it is marked there
+        discs.append((x, y, min(settings.clear_radius, window.inner_radius)))
     return discs
 
 
@@ -332,7 +353,7 @@ def _rasterise(views: Views, window: Window, settings: Settings) -> tuple[np.nda
     marks = np.ones((5, window.size, window.size), dtype=np.uint8)
     i0, j0 = window.corner
     see_cells(views.view, views.beams, views.reach, i0, j0, window.cell, seen)
-    apart = settings.blind_speed is not None and settings.blind_speed < settings.object_speed
+    apart = settings.unseen_speed < settings.object_speed
     mark_sources(
         views.view, views.beams, views.ranges, views.met, views.reach, views.far_side,
         views.scans, int(apart), i0, j0, window.cell, 2 * settings.range_noise + SLACK, marks,
@@ -351,7 +372,7 @@ def _arrival(
     previous: FutureModel | None,
 ) -> tuple[np.ndarray, np.ndarray]:
     """(ticks, broken premises): arrival times, never earlier than memory knows."""
-    blind_speed = settings.object_speed if settings.blind_speed is None else settings.blind_speed
+    blind_speed = settings.unseen_speed
     to_source = distance_between_cells(marks[SOURCES])
     if blind_speed > 0 and not marks[BLIND_SOURCES].all():
         to_blind = distance_between_cells(marks[BLIND_SOURCES])

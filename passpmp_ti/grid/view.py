@@ -103,7 +103,9 @@ def views_of(
         labels[scan.lost] = wedges.LOST
         labels = labels.astype(np.int32)
         if static_map is not None:
-            wedges.label_by_map(r, view, v, settings.object_width, map_cells, frame, labels)
+            wedges.label_by_map(
+                r, view, v, int(closed), settings.object_width, map_cells, frame, labels
+            )
         wedges.prove_wedges(
             r, labels, view, v, int(closed), settings.object_width, settings.range_noise,
             settings.cell, map_cells, frame, reach, far_side,

@@ -67,6 +67,7 @@ def label_by_map(
     ranges: Floats,  # [n]
     view: ti.types.ndarray(dtype=ti.f32, ndim=2),  # [V, 8]
     v: ti.i32,
+    closed: ti.i32,  # 1: the beams go all the way round
     width: ti.f32,
     map_static: Bytes2,
     frame: Floats,  # [6]
@@ -92,6 +93,8 @@ def label_by_map(
             span = ti.min(span, n // 2)
             for k in range(-span, span + 1):
                 other = beam + k
+                if closed == 1:
+                    other = (other + n) % n
                 if other >= 0 and other < n:
                     if met[other] == MOVABLE:
                         dx = end_x(view, v, other, ranges[other]) - x
@@ -152,8 +155,10 @@ def prove_wedges(
             limit = far
             if far * angle > width:
                 limit = width / angle
-            # noise: each range may be this much too long
-            proven = ti.max(limit - 0.5 * limit * angle - noise - SLACK, 0.0)
+            # the chord lies at limit cos(angle / 2), and a corner sticks out of it by half of it:
+            # cos x - sin x > 1 - x - x^2 / 2. Noise: each range may be this much too long.
+            half = 0.5 * angle
+            proven = ti.max(limit * (1.0 - half - 0.5 * half * half) - noise - SLACK, 0.0)
             if met[a] == STATIC and met[b] == STATIC and limit == far:
                 xa = end_x(view, v, a, ranges[a])
                 ya = end_y(view, v, a, ranges[a])

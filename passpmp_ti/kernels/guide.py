@@ -115,7 +115,8 @@ def guide_at(time: ti.template(), ahead: ti.template(), frame: ti.template(), x,
 
     frame: 0, 1 corner of cell [0, 0]; 2 cells a metre; 3, 4 goal; 5: 1 straight distance [m],
     0 the field [s]; 6 radius about the goal within which the cost is 0 [m]; 7 time that a turn
-    by a right angle takes [s]; 8, 9 column and row at which `ahead` begins; 10 seconds a metre in the open.
+    by a right angle takes [s]; 8, 9 column and row at which `ahead`
+    begins; 10 seconds a metre in the open.
     """
     dx = x - frame[3]
     dy = y - frame[4]

@@ -118,10 +118,19 @@ def keeps_out(
     dx = x - view[v, 0]
     dy = y - view[v, 1]
     r = ti.sqrt(dx * dx + dy * dy)
-    w = wedge_at(view, n, v, ti.atan2(dy, dx))
-    return reach[v, w] >= r or (
-        far_side[v, w] == SHUT and before_wall(view, n, ranges, v, w, x, y, tolerance, cell)
-    )
+    bearing = ti.atan2(dy, dx)
+    kept = True
+    # A place on this view's own border is not kept out, to the last bit of it: two views of one
+    # sensor share their borders, and each must not rely on the other.
+    for half in range(2):
+        w = wedge_at(view, n, v, bearing + (2 * half - 1) * BEARING_SLACK)
+        kept = kept and (
+            reach[v, w] >= r + 2.0 * SLACK
+            or (
+                far_side[v, w] == SHUT and before_wall(view, n, ranges, v, w, x, y, tolerance, cell)
+            )
+        )
+    return kept
 
 
 @ti.func
@@ -219,10 +228,10 @@ def mark_piece(
     cell,
     tolerance,
 ):
-    """Mark the cell of one sample of a border piece, unless another view sees past it."""
+    """Mark the cell of one sample of a border piece, unless a view keeps movers out of there."""
     inside = False
     for w in range(view.shape[0]):
-        if w != v and not inside:
+        if not inside:
             inside = keeps_out(view, beams[w], ranges, reach, far_side, w, x, y, tolerance, cell)
     if not inside:
         i = ti.cast(ti.floor(x / cell), ti.i32) - corner_i

@@ -97,7 +97,9 @@ def random_scans(generator, world, position, settings, scale, robot, stamp=None)
         heading = position[2] + mount
         ahead = 0.0 if fov > 6 else 0.5 * robot.disc_radius
         pose = (
-            position[0] + ahead * np.cos(heading), position[1] + ahead * np.sin(heading), heading,
+            position[0] + ahead * np.cos(heading),
+            position[1] + ahead * np.sin(heading),
+            heading,
         )
         scan = exact.sweep(world, pose, beams, fov, range_max, stamp, labelled=labelled)
         scans.append(marred(generator, scan, settings.range_noise))
@@ -113,7 +115,12 @@ def marred(generator, scan, noise):
         start = generator.integers(len(ranges))
         ranges[(start + np.arange(generator.integers(1, 25))) % len(ranges)] = np.nan
     return Scan(
-        ranges, scan.angle_min, scan.angle_increment, scan.range_max, scan.pose, scan.stamp,
+        ranges,
+        scan.angle_min,
+        scan.angle_increment,
+        scan.range_max,
+        scan.pose,
+        scan.stamp,
         scan.moving,
     )
 
@@ -157,7 +164,7 @@ def breaks(case, states, times, control, attackers, step=FINE):
     if not len(c):
         return broken
     stride = max(round(COARSE / step), 1)
-    slack = (robot.top_speed + robot.top_turn_rate * max(abs(o) for o, _ in robot.discs) + bound)
+    slack = robot.top_speed + robot.top_turn_rate * max(abs(o) for o, _ in robot.discs) + bound
     slack *= stride * step
     for n in np.flatnonzero(~broken & (rest > 0)):
         last = int(moving[n].sum())
@@ -170,7 +177,10 @@ def breaks(case, states, times, control, attackers, step=FINE):
             # the nearest first: one attacker is enough
             order = np.flatnonzero(close)[np.argsort(apart.min(axis=0)[close])]
             for some in np.split(order, [3, 20]):
-                broken[n] = broken[n] or exact.reaches(
-                    points, when, (c[some], rho[some]), radius, bound, case.world
-                ).any()
+                broken[n] = (
+                    broken[n]
+                    or exact.reaches(
+                        points, when, (c[some], rho[some]), radius, bound, case.world
+                    ).any()
+                )
     return broken

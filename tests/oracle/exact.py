@@ -77,9 +77,7 @@ def sweep(world, pose, beams, fov, range_max, stamp=0.0, *, labelled=True):
     angle_min = -np.pi if full else -fov / 2
     bearings = pose[2] + angle_min + increment * np.arange(beams)
     ranges, static = cast(world, pose[:2], bearings, range_max)
-    return Scan(
-        ranges, angle_min, increment, range_max, pose, stamp, ~static if labelled else None
-    )
+    return Scan(ranges, angle_min, increment, range_max, pose, stamp, ~static if labelled else None)
 
 
 def point_to_edges(points, edges):
@@ -179,8 +177,10 @@ def hidden_discs(scans, world, body, settings, count, generator):
     each = count // len(scans) + 1
     centres, radii = [], []
     for scan in scans:
-        radius = 0.5 * settings.object_width * np.where(
-            generator.random(each) < 0.7, 1.0, 1 + 3 * generator.random(each)
+        radius = (
+            0.5
+            * settings.object_width
+            * np.where(generator.random(each) < 0.7, 1.0, 1 + 3 * generator.random(each))
         )
         bearing = generator.uniform(-np.pi, np.pi, each)
         between = generator.random(each) < 0.5
