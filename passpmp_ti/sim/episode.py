@@ -106,6 +106,7 @@ class Episode:
             "cycle_time_worst": float(warm.max()),
             "cycle_time_first": float(self.update_times[0]),
             "roots_unproved": sum(not r.root_proved for r in self.records),
+            "held_unclear": sum(not r.held_clear for r in self.records),
             "broken_premises": sum(len(r.broken_premises) > 0 for r in self.records),
             "lost_scans": sum(bool(r.lost_scan) for r in self.records),
         }
@@ -136,6 +137,7 @@ class Episode:
             "tree_nodes",
             "tree_depth",
             "root_proved",
+            "held_clear",
             "deviation",
         )
         timings = sorted({key for r in self.records for key in r.timings})
