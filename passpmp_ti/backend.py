@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import io
 import logging
 import os
 from pathlib import Path
@@ -51,14 +53,14 @@ def init(backend: str = "auto", threads: int | None = None, *, debug: bool = Fal
         offline_cache=True,
         offline_cache_file_path=str(cache_folder()),
         fast_math=False,
-        verbose=False,
         debug=debug,
         random_seed=0,
     )
     if threads is not None:
         options["cpu_max_num_threads"] = threads
     try:
-        ti.init(arch=getattr(ti, wanted), enable_fallback=False, **options)
+        with contextlib.redirect_stdout(io.StringIO()):
+            ti.init(arch=getattr(ti, wanted), enable_fallback=False, **options)
     except RuntimeError as cause:
         if backend != "auto":
             raise RuntimeError(
@@ -66,7 +68,8 @@ def init(backend: str = "auto", threads: int | None = None, *, debug: bool = Fal
                 " use 'auto' or 'cpu'"
             ) from cause
         wanted = "cpu"
-        ti.init(arch=ti.cpu, **options)
+        with contextlib.redirect_stdout(io.StringIO()):
+            ti.init(arch=ti.cpu, **options)
     _running = wanted
     logging.getLogger("passpmp_ti").info("kernels run on %s", wanted)
     return wanted

@@ -156,7 +156,7 @@ def test_noise_may_not_shut_a_gap_that_an_object_fits_through():
     dot = DifferentialDrive(discs=((0.0, 0.05),), wheel_speed=2.0, acceleration=4.0, track=1.5)
     settings = FINE.changed(object_speed=1.0, range_noise=noise)
     world = exact.world_of([exact.box(2.2, -1.3, 0.4, 2.0), exact.box(3.15, 0.0, 0.6, 6.0)])
-    true = exact.sweep(world, (0.0, 0.0, 0.0), 720, 2 * np.pi, 6.0, 10.0)
+    true = exact.sweep(world, (0.0, 0.0, 0.0), 2880, 2 * np.pi, 6.0, 10.0)
     error = np.where(true.points()[:, 0] > 2.8, -noise, noise)
     ranges = true.ranges.copy()
     ranges[true.returned] += error

@@ -37,6 +37,8 @@ class Scenario:
     movers: MoverSource = field(default_factory=NobodyMoves)
     start: tuple[float, float, float]
     """(x, y, theta) of the robot, at rest [m, m, rad]."""
+    start_spread: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    """Each seed moves the start by at most this, along x, y and theta [m, m, rad]."""
     goals: tuple[tuple[float, float], ...]
     """Places to be reached one after the other [m]."""
     duration: float
@@ -70,7 +72,8 @@ class Scenario:
         """The world of one episode.
 
         Args:
-            seed: chooses the movers, or the time at which a recording is entered; >= 0.
+            seed: chooses the movers, or the time at which a recording is entered, and where
+                within `start_spread` the robot starts; >= 0.
 
         Returns:
             The world, the robot's state [5] at rest, and the start time [s].
@@ -83,7 +86,19 @@ class Scenario:
             self.still_world(), self.start, self.duration, seed, np.random.default_rng([seed, 0])
         )
         world = World(self.bounds, self.polygons, self.walls, movers)
-        return world, np.array([*self.start, 0.0, 0.0]), start_time
+        return world, np.array([*self._start_of(seed), 0.0, 0.0]), start_time
+
+    def _start_of(self, seed: int) -> np.ndarray:
+        """The start that a seed draws: seed 0 has the scenario's own."""
+        if seed == 0:
+            return np.array(self.start)
+        generator = np.random.default_rng([seed, 1])
+        still, spread = self.still_world(), np.array(self.start_spread)
+        for _ in range(1000):
+            start = np.array(self.start) + spread * generator.uniform(-1, 1, 3)
+            if still.clearance(start[None, :2])[0] > self.robot.radius:
+                return start
+        return np.array(self.start)
 
     def changed(
         self,

@@ -41,6 +41,7 @@ def read_scenario(path: Path) -> Scenario:
         document.blame(root.line_of("lidars"), "lidars must list at least one range finder")
     settings = _settings(root, robot, movers, lidars)
     start = root.array("start", (3,))
+    spread = root.array("start_spread", (3,), np.zeros(3))
     goals = root.array("goals", (None, 2))
     if goals is not None and not len(goals):
         document.blame(root.line_of("goals"), "goals must hold at least one point [x, y]")
@@ -63,6 +64,7 @@ def read_scenario(path: Path) -> Scenario:
             walls=world.segments,
             movers=movers,
             start=tuple(start.tolist()),
+            start_spread=tuple(spread.tolist()),
             goals=tuple(map(tuple, goals.tolist())),
             duration=duration,
             static_map=static_map if told else None,

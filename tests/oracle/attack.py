@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from oracle import exact
 
+from oracle import exact
 from passpmp_ti import CarLike, DifferentialDrive, FutureModel, Scan, Settings, cover_rectangle
 
 CHAIR = DifferentialDrive()
@@ -41,7 +41,7 @@ class Case:
 
 
 def random_case(generator):
-    """One world and its scans, with what may go wrong: lost beams, noise, labels, blind bearings."""
+    """One world and its scans: lost beams, noise, labels or none, blind bearings."""
     if generator.random() < 0.3:
         robot, scale = CAR, 5.0
         settings = Settings.for_robot(
