@@ -59,6 +59,11 @@ class Robot:
         return max(abs(offset) + radius for offset, radius in self.discs)
 
     @property
+    def overhang(self) -> float:
+        """Greatest distance of a disc's centre from the reference point [m]."""
+        return max(abs(offset) for offset, _ in self.discs)
+
+    @property
     def top_speed(self) -> float:
         """Greatest speed of the reference point [m/s]."""
         raise NotImplementedError
@@ -183,7 +188,7 @@ class CarLike(Robot):
         heading = second * dt**2 / 24 * self.longest_braking
         heading += v * slope / self.wheelbase * dt**2 / 4
         way = v * v / (2 * a)
-        return way * (heading + (self.top_turn_rate * dt) ** 2 / 24)
+        return way * (heading + (self.top_turn_rate * dt) ** 2 / 24) + heading * self.overhang
 
     def parameters(self) -> np.ndarray:
         return np.array(
@@ -253,7 +258,7 @@ class DifferentialDrive(Robot):
         turning = v / 3 * (2 / 3 * self.top_turn_rate) ** 2 * dt**2 / 24
         way = v * self.longest_braking / 2
         stops = 2 * a / self.track * dt**2 / 4
-        return turning * self.longest_braking / 2 + way * stops
+        return turning * self.longest_braking / 2 + (way + self.overhang) * stops
 
     def parameters(self) -> np.ndarray:
         return np.array(

@@ -165,7 +165,8 @@ def prove_wedges(
                 dx = end_x(view, v, b, ranges[b]) - xa
                 dy = end_y(view, v, b, ranges[b]) - ya
                 gap = ti.sqrt(dx * dx + dy * dy)
-                if gap <= width:
+                # the true gap may be wider than it looks by both ranges' noise
+                if gap + 2.0 * noise <= width:
                     side = SHUT
                 elif frame[5] > 0.5:
                     # a wall at a grazing angle: the map must know it all the way

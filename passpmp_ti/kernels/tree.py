@@ -5,7 +5,8 @@ Nodes are rows of flat arrays, parents before children, siblings side by side.
     pose [cap, 7] f32: see kernels/motion.py
     link [cap, 8] i32: 0 parent, 1 control, 2 steps of the primitive, 3 tick, 4 braking control
         that proves the node, 5 first child, 6 number of children, 7 what the node is
-    cost [cap, 2] f32: 0 integral of the guide along the plan to the node, 1 guide at the node
+    cost [cap, 5] f32: 0 integral of the guide along the plan to the node, 1 guide at the node,
+        2 integral along the braking that proves the node, 3 guide at its end, 4 its duration [s]
 """
 
 import taichi as ti
@@ -28,6 +29,7 @@ GROWN, BRAKED = 0, 1
 
 PARENT, CONTROL, STEPS, TICK, PROOF, FIRST, CHILDREN, WHAT = range(8)
 SAMPLES = 4  # of the guide along a primitive
+BRAKING_PACE = 5  # steps between samples of the guide along a braking
 
 Links = ti.types.ndarray(dtype=ti.i32, ndim=2)
 
@@ -44,6 +46,31 @@ def pose_of(pose: ti.template(), n):
 def store_pose(pose: ti.template(), n, q):
     for r in ti.static(range(7)):
         pose[n, r] = q[r]
+
+
+@ti.func
+def braking_cost(
+    kind: ti.template(),
+    guide: ti.template(),
+    ahead: ti.template(),
+    guide_frame: ti.template(),
+    numbers: ti.template(),
+    counts: ti.template(),
+    robot,
+    start,
+    control,
+):
+    """(integral of the guide along a braking, steps it takes, where it ends)."""
+    q = start
+    taken = 0
+    spent = 0.0
+    while not at_rest(kind, q):
+        q = step(kind, robot, q, control, 0.0, numbers[1])
+        taken += 1
+        if taken % BRAKING_PACE == 0:
+            spent += guide_at(guide, ahead, guide_frame, q[X], q[Y], q[C], q[S]) * BRAKING_PACE
+    spent += guide_at(guide, ahead, guide_frame, q[X], q[Y], q[C], q[S]) * (taken % BRAKING_PACE)
+    return spent * numbers[1], taken, q
 
 
 @ti.kernel
@@ -158,27 +185,37 @@ def grow_level(
                     link[slot, WHAT] = GROWN
                     cost[slot, 0] = child_cost[m, 0]
                     cost[slot, 1] = child_cost[m, 1]
+                    spent, taken, rest = braking_cost(
+                        kind,
+                        guide,
+                        ahead,
+                        guide_frame,
+                        numbers,
+                        counts,
+                        robot_of(numbers),
+                        pose_of(pose, slot),
+                        control_of(braking, link[slot, PROOF]),
+                    )
+                    cost[slot, 2] = spent
+                    cost[slot, 3] = guide_at(
+                        guide, ahead, guide_frame, rest[X], rest[Y], rest[C], rest[S]
+                    )
+                    cost[slot, 4] = taken * numbers[1]
                     slot += 1
         elif link[parent, CHILDREN] < 0:
             link[parent, CHILDREN] = 1
-            robot = robot_of(numbers)
-            q = pose_of(pose, parent)
-            control = control_of(braking, link[parent, PROOF])
-            taken = 0
-            spent = 0.0
-            while not at_rest(kind, q):
-                q = step(kind, robot, q, control, 0.0, numbers[1])
-                taken += 1
-                if taken % 5 == 0:
-                    spent += (
-                        guide_at(guide, ahead, guide_frame, q[X], q[Y], q[C], q[S]) * 5 * numbers[1]
-                    )
-            spent += (
-                guide_at(guide, ahead, guide_frame, q[X], q[Y], q[C], q[S])
-                * (taken % 5)
-                * numbers[1]
+            spent, taken, rest = braking_cost(
+                kind,
+                guide,
+                ahead,
+                guide_frame,
+                numbers,
+                counts,
+                robot_of(numbers),
+                pose_of(pose, parent),
+                control_of(braking, link[parent, PROOF]),
             )
-            store_pose(pose, slot, q)
+            store_pose(pose, slot, rest)
             link[slot, PARENT] = parent
             link[slot, CONTROL] = link[parent, PROOF]
             link[slot, STEPS] = taken
@@ -188,4 +225,7 @@ def grow_level(
             link[slot, CHILDREN] = 0
             link[slot, WHAT] = BRAKED
             cost[slot, 0] = cost[parent, 0] + spent
-            cost[slot, 1] = guide_at(guide, ahead, guide_frame, q[X], q[Y], q[C], q[S])
+            cost[slot, 1] = guide_at(guide, ahead, guide_frame, rest[X], rest[Y], rest[C], rest[S])
+            cost[slot, 2] = 0.0
+            cost[slot, 3] = cost[slot, 1]
+            cost[slot, 4] = 0.0

@@ -35,8 +35,8 @@ against the least progress worth having, since a cost to go of a minute is no re
 COAST = 4.0
 """How far ahead the decision time looks [s]."""
 COAST_PACE = 0.1
-POSE_SLACK = 0.05
-"""[m] beyond the tracking error at which a robot is no longer where its plan has it."""
+POSE_SLACK = 1e-3
+"""[m] beyond the declared errors at which a robot is no longer where its plan has it."""
 
 
 class Navigator:
@@ -107,6 +107,8 @@ class Navigator:
         """
         began = time.perf_counter()
         scans = [scan] if isinstance(scan, Scan) else list(scan)
+        if not scans:
+            return self._without_scan(state)
         stamp = scans[0].stamp
         if self.held is None:
             self._start(state, stamp)
@@ -129,6 +131,20 @@ class Navigator:
         timings = {"model": modelled - began, **record.timings}
         timings["total"] = time.perf_counter() - began
         self.record = replace(record, timings=timings)
+        return self.held
+
+    def _without_scan(self, state: np.ndarray) -> Trajectory:
+        """Nothing was sensed at all: the robot goes on with what it holds."""
+        if self.held is None:
+            raise ValueError(
+                "Navigator.update: the first cycle needs a scan; without one there is no time to"
+                f" start from; the robot is at {np.asarray(state)!r}"
+            )
+        trouble = "no scan at all"
+        self.record = CycleRecord(
+            stamp=self.record.stamp, decision="held", reason=trouble, lost_scan=trouble,
+            goal=self.goal, plan_time=self.held.duration, chosen=self.held,
+        )  # fmt: skip
         return self.held
 
     def _start(self, state: np.ndarray, stamp: float) -> None:
@@ -167,7 +183,8 @@ class Navigator:
             root_proved=root_brake >= 0, held_clear=still_clear(model, self.held, start),
             broken_premises=model.broken_premises, model=model,
         )  # fmt: skip
-        lost = deviation > settings.tracking_error + POSE_SLACK
+        allowed = settings.tracking_error + settings.localisation_error + POSE_SLACK
+        lost = deviation > allowed
         if len(model.broken_premises) or lost:
             self._brake(model, state if lost else root, start)
             reason = (
@@ -188,7 +205,7 @@ class Navigator:
         tree = self._grower.grow(model, guide, root, start, root_brake)
         clock.lap("tree")
         leaf, particles, cost_new = self._choose(tree)
-        cost_held = trajectory_cost(self.held, start, guide, settings)
+        cost_held = trajectory_cost(self.held, start, guide, settings, self.robot)
         clock.lap("choice")
         decision, reason = "held", "no safe plan was found"
         if leaf != ROOT:

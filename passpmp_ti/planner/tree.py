@@ -39,7 +39,7 @@ class Tree:
     link: np.ndarray
     """[n, 8] int32, see kernels/tree.py."""
     cost: np.ndarray
-    """[n, 2] float32: integral of the guide along the plan, guide at the node."""
+    """[n, 5] float32: the guide along the plan, at the node, and along its braking; see there."""
     start: float
     """Absolute time of the root, t_{k+1} [s]."""
     depth: int
@@ -177,7 +177,7 @@ class TreeGrower:
         most = capacity * fan
         self._pose = np.zeros((capacity, 7), dtype=np.float32)
         self._link = np.zeros((capacity, 8), dtype=np.int32)
-        self._cost = np.zeros((capacity, 2), dtype=np.float32)
+        self._cost = np.zeros((capacity, 5), dtype=np.float32)
         self._child_pose = np.zeros((most, 7), dtype=np.float32)
         self._child_proof = np.zeros(most, dtype=np.int32)
         self._child_cost = np.zeros((most, 2), dtype=np.float32)
@@ -198,7 +198,8 @@ class TreeGrower:
         began = time.perf_counter()
         self._pose[0] = to_poses(root[None], model.window.anchor)[0]
         self._link[0] = (NO_PARENT, 0, 0, model.ticks_of(start), proof, -1, 0, 0)
-        self._cost[0] = (0.0, guide.at(root[None])[0])
+        here = guide.at(root[None])[0]
+        self._cost[0] = (0.0, here, 0.0, here, 0.0)
         counts = model.counts
         grown = np.zeros(2, dtype=np.int32)
         first, last, depth, stopped_by = 0, 1, 0, "depth"
