@@ -1,7 +1,7 @@
 """Drive shipped scenarios over many seeds and report what happened, metres beside every zero.
 
-    python benchmarks/scenarios.py crowded --seeds 20 --object-speed 10
-    python benchmarks/scenarios.py eth --seeds 20 --set object_speed=2.2 --json eth-2.2.json
+python benchmarks/scenarios.py crowded --seeds 20 --object-speed 10
+python benchmarks/scenarios.py eth --seeds 20 --set object_speed=2.2 --json eth-2.2.json
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("scenario")
     parser.add_argument("--seeds", type=int, default=20)
-    parser.add_argument("--object-speed", type=float, help="bound on movers, and their speeds [m/s]")
+    parser.add_argument("--object-speed", type=float, help="bound, and movers slowed to it [m/s]")
     parser.add_argument("--set", action="append", default=[], metavar="FIELD=VALUE")
     parser.add_argument("--workers", type=int, default=multiprocessing.cpu_count())
     parser.add_argument("--json", type=Path)
@@ -73,9 +73,7 @@ def main() -> int:
         rows = []
         for row in pool.imap(drive, jobs):
             rows.append(row)
-            print(
-                f"\r{len(rows)}/{len(jobs)} episodes", end="", file=sys.stderr, flush=True
-            )
+            print(f"\r{len(rows)}/{len(jobs)} episodes", end="", file=sys.stderr, flush=True)
     print(file=sys.stderr)
     result = table_row(rows)
     for key, value in result.items():

@@ -18,7 +18,7 @@ import numpy as np
 import passpmp_ti as pti
 from passpmp_ti.sim.episode import CycleInfo, simulate
 from passpmp_ti.sim.lidar import Lidar
-from passpmp_ti.sim.movers import NoMovers
+from passpmp_ti.sim.movers import PathMovers
 from passpmp_ti.sim.scenario import load_scenario
 from passpmp_ti.sim.world import World
 from passpmp_ti.viz import palette, panel, text
@@ -30,7 +30,7 @@ from passpmp_ti.viz.region import braking_ics
 from passpmp_ti.viz.scene import draw_cycle
 
 FOLDER = Path(__file__).parent / "images"
-LATEST = 4.0
+LATEST = 2.0
 """Where the colours of the arrival map end [s]."""
 
 
@@ -38,10 +38,8 @@ def main(names: list[str]) -> None:
     pti.init()
     FOLDER.mkdir(exist_ok=True)
     for name in names or PICTURES:
-        try:
-            image = PICTURES[name]()
-        except (ValueError, OSError) as problem:
-            print(f"{name}: left as it is; {problem}")
+        image = PICTURES[name]()
+        if image is None:
             continue
         path = FOLDER / f"{name}.png"
         path.write_bytes(palette_png(image))
@@ -54,19 +52,25 @@ def cycle() -> np.ndarray:
     return _cycle_after(scenario, 5.0, 0, (1280, 980))
 
 
-def eth() -> np.ndarray:
-    """The wheelchair among recorded people, on its way."""
-    return _cycle_after(load_scenario("eth"), 14.0, 3, (1280, 1000))
+def eth() -> np.ndarray | None:
+    """The wheelchair among recorded people, on its way; None without the recording."""
+    try:
+        scenario = load_scenario("eth")
+    except (ValueError, OSError) as problem:
+        print(f"eth: left as it is; {problem}")
+        return None
+    return _cycle_after(scenario, 5.0, 0, (1500, 1000))
 
 
 def _cycle_after(scenario, seconds: float, seed: int, size: tuple[int, int]) -> np.ndarray:
-    """The cycle nearest after `seconds` of a drive."""
+    """The first cycle after `seconds` of a drive whose tree has a branch that ends in braking."""
     trail: list[np.ndarray] = []
     found: list[np.ndarray] = []
 
     def see(info: CycleInfo) -> None:
         trail.append(info.state[:2].copy())
-        if info.time - start < seconds - 1e-6 or found:
+        tree = info.navigator.record.tree
+        if info.time - start < seconds - 1e-6 or tree is None or not tree.braking.any() or found:
             return
         canvas = Canvas(scenario.bounds, size)
         speed = info.navigator.settings.object_speed
@@ -74,7 +78,7 @@ def _cycle_after(scenario, seconds: float, seed: int, size: tuple[int, int]) -> 
         found.append(draw_cycle(moment_of(info, np.array(trail)), canvas, region_states=60_000))
 
     start = scenario.build(seed)[2]
-    simulate(replace(scenario, duration=seconds + scenario.settings.cycle), seed=seed, on_cycle=see)
+    simulate(replace(scenario, duration=seconds + 5.0), seed=seed, on_cycle=see)
     return found[0]
 
 
@@ -82,10 +86,11 @@ def arrival() -> np.ndarray:
     """The arrival times that one scan leaves, with what it saw and what emits."""
     robot = pti.DifferentialDrive()
     settings = pti.Settings.for_robot(robot, object_speed=1.5)
-    bounds = (-3.0, -3.0, 7.0, 4.0)
-    walls = np.array([[-3, -2.2, 7, -2.2], [-3, 3.2, 2.4, 3.2], [3.6, 3.2, 7, 3.2]], dtype=float)
+    bounds = (-3.5, -3.0, 6.5, 4.0)
+    walls = np.array([[-8, -2.2, 7, -2.2], [-8, 3.2, 2.4, 3.2], [3.6, 3.2, 7, 3.2]], dtype=float)
     box = np.array([[3.2, -0.9], [4.2, -0.9], [4.2, 0.1], [3.2, 0.1]])
-    world = World(bounds, (box,), walls, _Somebody())
+    somebody = PathMovers([np.array([[0.0, 1.4, 1.7]])], np.array([0.25]))
+    world = World(bounds, (box,), walls, somebody)
     lidar = Lidar(range_max=6.0, beams=1440, labels="sensor")
     state = np.zeros(5)
     model = pti.FutureModel.from_scan(lidar.scan(world, state, 0.0), robot, settings)
@@ -111,7 +116,7 @@ def arrival() -> np.ndarray:
         Entry(panel.AREA, palette.ICS, "seen, but no room for the robot"),
         Entry(panel.AREA, palette.STATIC, "a return that stays"),
         Entry(panel.AREA, palette.MOVER, "a return that may move"),
-        Entry(panel.AREA, palette.ROBOT, "source: something may come out"),
+        Entry(panel.AREA, palette.ROBOT, "source: may let things out"),
         Entry(panel.DISC, palette.ROBOT, "robot"),
     ]
     readings = [
@@ -123,25 +128,8 @@ def arrival() -> np.ndarray:
     place, below = canvas.layout.panel, canvas.layout.panel_below
     panel.draw(canvas.page, place, below, "This scan", readings, "", entries)
     image = canvas.image()
-    _colour_bar(image, (place[0], place[1] + place[3] - 90, 330))
+    _colour_bar(image, (place[0], place[1] + place[3] - 60, place[2] - 8))
     return image
-
-
-class _Somebody(NoMovers):
-    """One person who stands."""
-
-    def __init__(self) -> None:
-        self._centre = np.array([[1.4, 1.7]])
-
-    @property
-    def radius(self) -> np.ndarray:
-        return np.array([0.25])
-
-    def at(self, time: float) -> np.ndarray:
-        return self._centre
-
-    def present(self, time: float) -> np.ndarray:
-        return np.array([True])
 
 
 def region() -> np.ndarray:
@@ -164,7 +152,7 @@ def region() -> np.ndarray:
         share = 100 * found.share(found.seen)
         canvas.title(f"{speed:g} m/s", f"heading along x: {share:.0f} % of the seen is p-safe")
         x, _, w, _ = canvas.layout.plot
-        pages.append(canvas.image()[:, : x + w + 12])
+        pages.append(canvas.image()[:, : x + w + 20])
     return np.concatenate(pages, axis=1)
 
 
@@ -180,7 +168,7 @@ def _cells_of_pixels(canvas: Canvas, model: pti.FutureModel) -> tuple[np.ndarray
 
 def _colours(values: np.ndarray) -> np.ndarray:
     """[h, w, 3] (red, green, blue) of [h, w] uint8: dark is soon, bright is late."""
-    steps = values // 16 * 16 + 8  # sixteen colours: a step is a quarter of a second
+    steps = values // 16 * 16 + 8  # sixteen colours: a step is LATEST / 16
     return cv2.applyColorMap(steps, cv2.COLORMAP_VIRIDIS)[:, :, ::-1]
 
 
@@ -191,17 +179,20 @@ def _colour_bar(image: np.ndarray, place: tuple[int, int, int]) -> None:
         image, "earliest touch after the scan", (x, y - 8), palette.INK, 14, weight=text.HEADING
     )
     image[y : y + 18, x : x + width] = _colours(np.ascontiguousarray(bar))
-    for second in range(int(LATEST) + 1):
-        at = x + width * second / LATEST
-        label = f"{second} s" if second < LATEST else f"≥ {second} s"
-        text.draw(image, label, (at, y + 36), palette.MUTED, 13, align=second / LATEST)
+    for share in (0.0, 0.25, 0.5, 0.75, 1.0):
+        label = f"{'≥ ' if share == 1 else ''}{share * LATEST:g} s"
+        at = (x + width * share, y + 36)
+        text.draw(image, label, at, palette.MUTED, 13, align=share)
 
 
-def palette_png(image: np.ndarray, colours: int = 128) -> bytes:
-    """A PNG of [H, W, 3] uint8 with a palette of the picture's own commonest colours."""
+def palette_png(image: np.ndarray, colours: int = 256) -> bytes:
+    """A PNG of [H, W, 3] uint8 with a palette of its commonest colours and all of the program's."""
     packed = image.astype(np.uint32) @ np.array([65536, 256, 1], dtype=np.uint32)
     values, back, counts = np.unique(packed, return_inverse=True, return_counts=True)
-    kept = values[np.argsort(-counts, kind="stable")[:colours]]
+    named = np.array([c for c in vars(palette).values() if isinstance(c, tuple)], dtype=np.uint32)
+    named = np.unique(named @ np.array([65536, 256, 1], dtype=np.uint32))
+    common = values[np.argsort(-counts, kind="stable")]
+    kept = np.concatenate([named, common[~np.isin(common, named)]])[:colours]
     split = np.stack([kept >> 16, kept >> 8 & 255, kept & 255], axis=1).astype(np.int32)
     every = np.stack([values >> 16, values >> 8 & 255, values & 255], axis=1).astype(np.int32)
     nearest = np.concatenate(

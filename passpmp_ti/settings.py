@@ -139,12 +139,6 @@ class Settings:
             raise ValueError(
                 f"Settings.guide_movers must be true or false; got {self.guide_movers!r}"
             )
-        if self.map_tolerance >= 0.5 * self.object_width:
-            raise ValueError(
-                f"Settings.map_tolerance = {self.map_tolerance:g} m must be less than half of"
-                f" object_width = {self.object_width:g} m: a door as wide as an object must not be"
-                " taken for wall"
-            )
         if self.window is not None:
             door.whole(name, "window", self.window, least=16, most=8192)
             if self.window % 16:

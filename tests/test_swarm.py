@@ -44,7 +44,7 @@ def random_tree(nodes, generator):
 @pytest.mark.parametrize("particles", [20, 50, 100])
 def test_the_swarm_finds_the_optimum_in_99_of_100_runs(nodes, particles):
     generator = np.random.default_rng(nodes * 1000 + particles)
-    settings = Settings(particles=particles, sub_swarms=1, capacity=nodes, iterations=60)
+    settings = Settings(particles=particles, sub_swarms=1, capacity=nodes, iterations=200)
     swarm = Swarm(settings)
     found = 0
     for _ in range(100):

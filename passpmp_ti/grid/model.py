@@ -101,6 +101,12 @@ class FutureModel:
                 f"FutureModel.from_scan: scans of one instant have one stamp; got {stamp} and"
                 f" {apart[0]}; make one model after the other instead, with previous="
             )
+        if static_map is not None and settings.map_tolerance >= 0.5 * settings.object_width:
+            raise ValueError(
+                f"Settings.map_tolerance = {settings.map_tolerance:g} m must be less than half of"
+                f" object_width = {settings.object_width:g} m where there is a static map: a door"
+                " as wide as an object must not be taken for wall"
+            )
         if previous is not None:
             _check_previous(previous, robot, settings, stamp)
         if position is None:

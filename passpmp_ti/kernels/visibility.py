@@ -50,18 +50,68 @@ def wedges_across(view: ti.template(), n, v, x, y, pad):
 
 
 @ti.func
-def proves(view: ti.template(), n, reach: ti.template(), v, x, y, pad, far):
-    """Whether view v proves empty every bearing that a disc of radius `pad` spans, out to `far`."""
-    ok = far <= view[v, 5]
-    if ok:
-        first, count = wedges_across(view, n, v, x, y, pad)
-        k = 0
-        while ok and k < count:
-            w = first + k
-            if w >= n:
-                w -= n
-            ok = reach[v, w] >= far
-            k += 1
+def way_out(c, s, dx, dy, half):
+    """How far a ray along (c, s) is when it leaves a square centred at (dx, dy); 0: it misses."""
+    enter = 0.0
+    leave = 1e9
+    for axis in ti.static(range(2)):
+        direction = c
+        middle = dx
+        if ti.static(axis == 1):
+            direction = s
+            middle = dy
+        if ti.abs(direction) > 1e-7:
+            near = (middle - half) / direction
+            far = (middle + half) / direction
+            enter = ti.max(enter, ti.min(near, far))
+            leave = ti.min(leave, ti.max(near, far))
+        elif ti.abs(middle) > half:
+            leave = 0.0
+    if leave < enter:
+        leave = 0.0
+    return leave
+
+
+@ti.func
+def proves_cell(view: ti.template(), n, reach: ti.template(), v, x, y, cell):
+    """Whether view v proves every point of the cell centred at (x, y) empty.
+
+    Wedge by wedge: the farthest point of the cell in it must be within the wedge's reach. That
+    point is where one of the wedge's two rays leaves the cell, or a corner between them.
+    """
+    half = 0.5 * cell
+    dx = x - view[v, 0]
+    dy = y - view[v, 1]
+    far = ti.sqrt((ti.abs(dx) + half) ** 2 + (ti.abs(dy) + half) ** 2) + SLACK
+    first, count = wedges_across(view, n, v, x, y, 0.7071068 * cell)
+    ok = True
+    k = 0
+    while ok and k < count:
+        w = first + k
+        if w >= n:
+            w -= n
+        if reach[v, w] < far:
+            low = view[v, 2] + w * view[v, 3] - BEARING_SLACK
+            high = low + view[v, 3] + 2.0 * BEARING_SLACK
+            if w == n - 1:
+                high = view[v, 2] + TAU + BEARING_SLACK
+                # a closing wedge wider than a right angle is never judged this finely
+                ok = view[v, 4] < 1.5
+            cl = ti.cos(low)
+            sl = ti.sin(low)
+            ch = ti.cos(high)
+            sh = ti.sin(high)
+            farthest = ti.max(way_out(cl, sl, dx, dy, half), way_out(ch, sh, dx, dy, half))
+            for corner in ti.static(range(4)):
+                px = dx + half * (2 * (corner % 2) - 1)
+                py = dy + half * (2 * (corner // 2) - 1)
+                if cl * py - sl * px >= -SLACK and px * sh - py * ch >= -SLACK:
+                    farthest = ti.max(farthest, ti.sqrt(px * px + py * py))
+            # the sensor's own cell spans every bearing: only its farthest corner will do there
+            if ti.abs(dx) <= cell and ti.abs(dy) <= cell:
+                farthest = far
+            ok = ok and reach[v, w] >= farthest + SLACK
+        k += 1
     return ok
 
 
@@ -186,13 +236,7 @@ def see_cells(
                     y = (corner_j + j0 + dj + 0.5) * cell
                     for v in range(view.shape[0]):
                         if not empty:
-                            fx = ti.abs(x - view[v, 0]) + 0.5 * cell
-                            fy = ti.abs(y - view[v, 1]) + 0.5 * cell
-                            far = ti.sqrt(fx * fx + fy * fy) + SLACK
-                            if far <= view[v, 5]:
-                                empty = proves(
-                                    view, beams[v], reach, v, x, y, 0.7071068 * cell, far
-                                )
+                            empty = proves_cell(view, beams[v], reach, v, x, y, cell)
                 seen[j0 + dj, i0 + di] = ti.cast(empty, ti.u8)
 
 
