@@ -59,18 +59,17 @@ def eth() -> np.ndarray | None:
     except (ValueError, OSError) as problem:
         print(f"eth: left as it is; {problem}")
         return None
-    return _cycle_after(scenario, 5.0, 0, (1500, 1000))
+    return _cycle_after(scenario, 6.5, 0, (1500, 1000))
 
 
 def _cycle_after(scenario, seconds: float, seed: int, size: tuple[int, int]) -> np.ndarray:
-    """The first cycle after `seconds` of a drive whose tree has a branch that ends in braking."""
+    """The cycle nearest after `seconds` of a drive."""
     trail: list[np.ndarray] = []
     found: list[np.ndarray] = []
 
     def see(info: CycleInfo) -> None:
         trail.append(info.state[:2].copy())
-        tree = info.navigator.record.tree
-        if info.time - start < seconds - 1e-6 or tree is None or not tree.braking.any() or found:
+        if info.time - start < seconds - 1e-6 or found:
             return
         canvas = Canvas(scenario.bounds, size)
         speed = info.navigator.settings.object_speed
@@ -78,7 +77,7 @@ def _cycle_after(scenario, seconds: float, seed: int, size: tuple[int, int]) -> 
         found.append(draw_cycle(moment_of(info, np.array(trail)), canvas, region_states=60_000))
 
     start = scenario.build(seed)[2]
-    simulate(replace(scenario, duration=seconds + 5.0), seed=seed, on_cycle=see)
+    simulate(replace(scenario, duration=seconds + 1.0), seed=seed, on_cycle=see)
     return found[0]
 
 

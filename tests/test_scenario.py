@@ -55,11 +55,20 @@ def test_a_shipped_scenario_builds_a_world_whose_start_is_clear_of_movers(name):
     scenario = load_scenario(name)
     world, state, start_time = scenario.build(seed=1)
     assert start_time == 0.0
-    assert state.tolist() == [*scenario.start, 0.0, 0.0]
+    assert (np.abs(state[:3] - scenario.start) <= scenario.start_spread).all()
+    assert state[3:].tolist() == [0.0, 0.0]
     assert world.movers.top_speed <= scenario.settings.object_speed
     gap = np.hypot(*(world.movers.at(0.0) - state[:2]).T) - world.movers.radius
     assert (gap > scenario.robot.radius).all()
     assert world.clearance(state[None, :2])[0] > scenario.robot.radius
+
+
+def test_seeds_but_the_first_start_elsewhere_within_the_spread():
+    scenario = load_scenario("corridor")
+    starts = [tuple(scenario.build(seed)[1][:3]) for seed in range(4)]
+    assert starts[0] == scenario.start
+    assert len(set(starts)) == 4
+    assert starts[1] == tuple(scenario.build(1)[1][:3])
 
 
 def test_another_bound_slows_the_crowd_down_with_it():
