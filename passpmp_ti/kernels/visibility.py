@@ -95,8 +95,8 @@ def proves_cell(view: ti.template(), n, reach: ti.template(), v, x, y, cell):
             high = low + view[v, 3] + 2.0 * BEARING_SLACK
             if w == n - 1:
                 high = view[v, 2] + TAU + BEARING_SLACK
-                # a closing wedge wider than a right angle is never judged this finely
-                ok = view[v, 4] < 1.5
+                # what lies between two rays is told by their sides: for less than half a turn
+                ok = view[v, 4] < 3.0
             cl = ti.cos(low)
             sl = ti.sin(low)
             ch = ti.cos(high)
@@ -107,10 +107,9 @@ def proves_cell(view: ti.template(), n, reach: ti.template(), v, x, y, cell):
                 py = dy + half * (2 * (corner // 2) - 1)
                 if cl * py - sl * px >= -SLACK and px * sh - py * ch >= -SLACK:
                     farthest = ti.max(farthest, ti.sqrt(px * px + py * py))
-            # the sensor's own cell spans every bearing: only its farthest corner will do there
-            if ti.abs(dx) <= cell and ti.abs(dy) <= cell:
-                farthest = far
-            ok = ok and reach[v, w] >= farthest + SLACK
+            # a wedge that does not touch the cell asks nothing of it
+            if farthest > 0.0:
+                ok = ok and reach[v, w] >= farthest + SLACK
         k += 1
     return ok
 
