@@ -7,6 +7,7 @@ quick.
 from __future__ import annotations
 
 import importlib
+import os
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -21,6 +22,9 @@ if TYPE_CHECKING:
     from passpmp_ti.sim.episode import simulate
     from passpmp_ti.sim.scenario import load_scenario
     from passpmp_ti.trajectory import Trajectory
+
+# Taichi greets on standard output when it is first imported; that belongs to the program.
+os.environ.setdefault("ENABLE_TAICHI_HEADER_PRINT", "0")
 
 __version__ = "0.1.0"
 

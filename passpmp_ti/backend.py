@@ -42,8 +42,6 @@ def init(backend: str = "auto", threads: int | None = None, *, debug: bool = Fal
             )
         return _running
 
-    # Taichi greets on standard output, which belongs to the program.
-    os.environ.setdefault("ENABLE_TAICHI_HEADER_PRINT", "0")
     import taichi as ti
 
     # taichi.gpu crashes on machines without one: name a backend, and CUDA only beside its driver.

@@ -56,15 +56,18 @@ def _run(given: argparse.Namespace) -> int:
             summaries.append(_drive(scenario, seed, progress, out, not given.no_video))
         except KeyboardInterrupt:
             interrupted = True
-            break
         finally:
             progress.end()
+        if interrupted or summaries[-1]["interrupted"]:
+            interrupted = True
+            break
     if summaries:
         print(f"\n{scenario.name}: {scenario.description}")
         print(summary_table(summaries))
     if interrupted:
+        whole = sum(not s["interrupted"] for s in summaries)
         print(
-            f"passpmp: interrupted; {len(summaries)} of {len(seeds)} runs ended by themselves",
+            f"passpmp: interrupted; {whole} of {len(seeds)} runs ended by themselves",
             file=sys.stderr,
         )
     if given.out:

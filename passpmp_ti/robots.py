@@ -79,6 +79,19 @@ class Robot:
         raise NotImplementedError
 
     @property
+    def deceleration(self) -> float:
+        """How hard it brakes on a straight line [m/s^2]."""
+        raise NotImplementedError
+
+    def within_limits(self, state: np.ndarray) -> np.ndarray:
+        """The nearest state that the robot's limits allow; state [5]. Only for a last resort: what
+        is proven for a clipped state is not proven for the state itself."""
+        clipped = np.array(state, dtype=np.float64)
+        for column, _, limit, _ in self._limits():
+            clipped[column] = np.clip(clipped[column], -limit, limit)
+        return clipped
+
+    @property
     def turn_time(self) -> float:
         """About how long a turn by a right angle takes [s]; for the guide only."""
         raise NotImplementedError
@@ -170,6 +183,10 @@ class CarLike(Robot):
         return self.v_max / self.acceleration
 
     @property
+    def deceleration(self) -> float:
+        return self.acceleration
+
+    @property
     def turn_time(self) -> float:
         # a quarter of the tightest circle at the speed at which it takes no more than the
         # acceleration limit sideways, or the top speed, and the time to steer
@@ -244,6 +261,10 @@ class DifferentialDrive(Robot):
     @property
     def longest_braking(self) -> float:
         return 2 * self.wheel_speed / self.acceleration
+
+    @property
+    def deceleration(self) -> float:
+        return self.acceleration
 
     @property
     def turn_time(self) -> float:

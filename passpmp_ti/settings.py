@@ -88,7 +88,8 @@ class Settings:
     weight_distance: float = 1.0
     """w_d of eq. 5."""
     weight_time: float = 0.02
-    """w_t of eq. 5."""
+    """w_t of eq. 5. With distance="mean" all plans are judged over one time and it decides nothing;
+    with "final" it weighs a plan's duration."""
     weight_turn: float = 0.5
     """Share of the time to turn towards the way down that the guide adds; 0: places alone."""
     goal_tolerance: float = 0.3
@@ -127,9 +128,11 @@ class Settings:
             "goal_tolerance",
         ):
             door.finite(name, field_, getattr(self, field_), above=0.0)
-        for field_ in ("blind_speed", "exploration_time", "cruise_speed"):
+        for field_ in ("blind_speed", "exploration_time"):
             if getattr(self, field_) is not None:
                 door.finite(name, field_, getattr(self, field_), least=0.0)
+        if self.cruise_speed is not None:
+            door.finite(name, "cruise_speed", self.cruise_speed, above=0.0, unit="m/s")
         if self.blind_speed is not None and self.blind_speed > self.object_speed:
             raise ValueError(
                 f"Settings.blind_speed = {self.blind_speed:g} m/s is above object_speed ="

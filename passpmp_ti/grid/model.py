@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from passpmp_ti import door
+from passpmp_ti import backend, door
 from passpmp_ti.grid.body import Body, to_poses
 from passpmp_ti.grid.distance import NO_SEED, distance_between_cells
 from passpmp_ti.grid.static_map import StaticMap
@@ -85,12 +85,15 @@ class FutureModel:
             settings: bounds, margins and resolution.
             previous: the model of the cycle before; what it proved is never lost.
             static_map: surfaces that stay.
-            position: the robot's (x, y, theta) at the scan [m, m, rad]; None: the first sensor's.
+            position: the robot's (x, y, theta) at the scan [m, m, rad]. None: the first sensor's,
+                which is right only for a sensor in the robot's middle: the robot's body is where
+                nobody else is.
 
         Raises:
             ValueError: scans of different instants, or a previous model that is newer or was made
                 for another robot, or on another grid.
         """
+        backend.init()
         scans = [scan] if isinstance(scan, Scan) else list(scan)
         if not scans:
             raise ValueError("FutureModel.from_scan: no scan given; give one, or several")

@@ -163,6 +163,8 @@ def grow_level(
                 found = 0
                 room = 0
             link[parent, FIRST] = slot
+            if found == 0:
+                link[parent, FIRST] = -1
             link[parent, CHILDREN] = found
             slot += room
         grown[0] = slot

@@ -129,8 +129,7 @@ class Guide:
         if settings.object_speed > 0 and not corners.all():
             room = distance_to_zeros(corners) * self._cell - clearance - settings.cell
             spare = room / settings.object_speed - 2 * settings.cycle
-            deceleration = float(robot.parameters()[4])
-            speed = np.clip(deceleration * spare, SLOWEST_SHARE * cruise, cruise)
+            speed = np.clip(robot.deceleration * spare, SLOWEST_SHARE * cruise, cruise)
         # the model keeps up to a cell more from a wall than the clearance
         kept = clearance + settings.cell + 0.5 * self._cell
         blocked = distance_to_zeros(self._walls) * self._cell < kept

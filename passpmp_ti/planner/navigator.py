@@ -239,13 +239,7 @@ class Navigator:
 
     def _brake(self, model: FutureModel, root: np.ndarray, start: float) -> None:
         """Hold braking at once: by a proven control, or by the one that stays clear longest."""
-        limits = self.robot.parameters()
-        root = root.copy()
-        if self.robot.kind == 0:
-            root[3] = np.clip(root[3], limits[1], limits[0])
-            root[4] = np.clip(root[4], -limits[2], limits[2])
-        else:
-            root[3:5] = np.clip(root[3:5], limits[1], limits[0])
+        root = self.robot.within_limits(root)
         proof = int(model.proving_brakes(root[None], np.array([start]))[0])
         self.held = (
             braking_from(model, root, start, proof)

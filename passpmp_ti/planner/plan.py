@@ -27,40 +27,42 @@ def braking_from(model: FutureModel, state: np.ndarray, start: float, control: i
 
 def longest_clear_braking(model: FutureModel, state: np.ndarray, start: float) -> Trajectory:
     """The braking that stays clear longest: what is left when none is proven."""
-    best, best_clear = None, -1.0
-    for control in range(len(model.body.braking)):
-        candidate = braking_from(model, state, start, control)
-        taken = model.occupied(candidate.states[:, :2], np.maximum(candidate.times, model.stamp))
-        clear = float(candidate.times[np.argmax(taken)]) if taken.any() else np.inf
-        if clear > best_clear:
-            best, best_clear = candidate, clear
-    assert best is not None
-    return best
+    candidates = [
+        braking_from(model, state, start, control) for control in range(len(model.body.braking))
+    ]
+    clear_until = [
+        float(c.times[np.argmax(taken)]) if (taken := touched(model, c)).any() else np.inf
+        for c in candidates
+    ]
+    return candidates[int(np.argmax(clear_until))]
 
 
 def still_clear(model: FutureModel, trajectory: Trajectory, since: float = -np.inf) -> bool:
     """Whether the model, asked at the trajectory's own samples from `since` on, finds it free.
 
-    The same look-ups that verified it: each sample while the robot moves, judged half a step
-    later. This is a second opinion on the whole path, not a new proof at other times.
+    A second opinion on the whole path, not a new proof at other times.
+    """
+    return not touched(model, trajectory)[trajectory.times >= since - 1e-9].any()
+
+
+def touched(model: FutureModel, trajectory: Trajectory) -> np.ndarray:
+    """[m] bool: samples at which something could touch the moving robot.
+
+    The look-ups that verified it: each sample that the robot moves into or out of, judged half a
+    step later, for every disc of its body.
     """
     robot, states = model.robot, trajectory.states
     resting = robot.at_rest(states)
-    # a sample matters if the robot moves into it or out of it
     moves = ~resting
     moves[:-1] |= ~resting[1:]
     moves[1:] |= ~resting[:-1]
-    moves &= trajectory.times >= since - 1e-9
-    if not moves.any():
-        return True
-    half = 0.5 * model.settings.time_step
-    times = np.maximum(trajectory.times[moves] + half, model.stamp)
+    result = np.zeros(len(states), dtype=bool)
+    times = np.maximum(trajectory.times[moves] + 0.5 * model.settings.time_step, model.stamp)
     x, y, theta = states[moves, 0], states[moves, 1], states[moves, 2]
     for offset, _ in robot.discs:
         points = np.stack([x + offset * np.cos(theta), y + offset * np.sin(theta)], axis=1)
-        if model.occupied(points, times).any():
-            return False
-    return True
+        result[moves] |= model.occupied(points, times)
+    return result
 
 
 def _as_trajectory(

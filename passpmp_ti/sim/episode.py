@@ -67,6 +67,8 @@ class Episode:
     """One per cycle, without the pictures' models and trees."""
     update_times: np.ndarray
     """[cycles] wall clock time of each planning cycle, scan to trajectory [s]."""
+    interrupted: bool = False
+    """Ended by Ctrl-C, before the goal and before its time."""
 
     def summary(self) -> dict[str, Any]:
         """The episode in numbers, SI units; None where there is nothing to tell.
@@ -108,6 +110,7 @@ class Episode:
             "roots_unproved": sum(not r.root_proved for r in self.records),
             "held_unclear": sum(not r.held_clear for r in self.records),
             "broken_premises": sum(len(r.broken_premises) > 0 for r in self.records),
+            "interrupted": self.interrupted,
             "lost_scans": sum(bool(r.lost_scan) for r in self.records),
         }
 
@@ -176,7 +179,7 @@ def simulate(
     """Drive once through a scenario.
 
     Each cycle: scan at t_k, let the planner answer, meanwhile execute until t_{k+1} what was held
-    before. Ends where the planner says the last goal is reached, or with the scenario's duration.
+    before. Ctrl-C ends it early, with what was done so far. Ends where the planner says the last goal is reached, or with the scenario's duration.
 
     Args:
         scenario: a scenario, a shipped name, or the path of a YAML file.
@@ -209,31 +212,21 @@ def simulate(
     )
     drive = Drive(scenario, world, state, start_time)
     errors = np.random.default_rng([seed, 1])
-    reached_at = None
-    for k in range(math.ceil(scenario.duration / chosen.cycle)):
-        stamp = start_time + k * chosen.cycle
-        state = drive.state_at(stamp)
-        scans = [lidar.scan(world, state, stamp, errors) for lidar in scenario.lidars]
-        began = clock.perf_counter()
-        answer = navigator.update(scans, state)
-        drive.note(navigator.record, clock.perf_counter() - began)
-        if on_cycle is not None:
-            on_cycle(
-                CycleInfo(
-                    time=stamp,
-                    world=world,
-                    navigator=navigator,
-                    state=state,
-                    scans=scans,
-                    contacts=drive.judge.contacts,
-                    executing=drive.executing,
-                )
-            )
-        if navigator.reached:
-            reached_at = stamp
-            break
-        drive.go_on(stamp, stamp + chosen.cycle)
-        drive.executing = answer
+    reached_at, interrupted = None, False
+    try:
+        for k in range(math.ceil(scenario.duration / chosen.cycle)):
+            stamp = start_time + k * chosen.cycle
+            answer = _cycle(scenario, world, navigator, drive, stamp, errors, on_cycle)
+            if navigator.reached:
+                reached_at = stamp
+                break
+            drive.go_on(stamp, stamp + chosen.cycle)
+            drive.executing = answer
+    except KeyboardInterrupt:
+        # what was done so far is worth telling; before the first cycle there is nothing
+        if not drive.records:
+            raise
+        interrupted = True
     return Episode(
         scenario=scenario,
         settings=chosen,
@@ -250,7 +243,38 @@ def simulate(
         nearest_wall=drive.judge.nearest_wall,
         records=tuple(drive.records),
         update_times=np.array(drive.update_times),
+        interrupted=interrupted,
     )
+
+
+def _cycle(
+    scenario: Scenario,
+    world: World,
+    navigator: Any,
+    drive: Drive,
+    stamp: float,
+    errors: np.random.Generator,
+    on_cycle: Callable[[CycleInfo], None] | None,
+) -> Trajectory:
+    """Scan at `stamp`, let the planner answer, show the watcher; returns the answer."""
+    state = drive.state_at(stamp)
+    scans = [lidar.scan(world, state, stamp, errors) for lidar in scenario.lidars]
+    began = clock.perf_counter()
+    answer = navigator.update(scans, state)
+    drive.note(navigator.record, clock.perf_counter() - began)
+    if on_cycle is not None:
+        on_cycle(
+            CycleInfo(
+                time=stamp,
+                world=world,
+                navigator=navigator,
+                state=state,
+                scans=scans,
+                contacts=drive.judge.contacts,
+                executing=drive.executing,
+            )
+        )
+    return answer
 
 
 def _told(gap: float) -> float | None:
