@@ -1,3 +1,5 @@
+import os
+
 import pytest
 
 import passpmp_ti as pti
@@ -5,5 +7,5 @@ import passpmp_ti as pti
 
 @pytest.fixture(scope="session", autouse=True)
 def kernels():
-    """Taichi is initialised once a session."""
-    pti.init("cpu")
+    """Taichi is initialised once a session; PASSPMP_DEBUG=1 checks every index in the kernels."""
+    pti.init("cpu", debug=bool(os.environ.get("PASSPMP_DEBUG")))

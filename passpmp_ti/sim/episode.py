@@ -179,7 +179,8 @@ def simulate(
     """Drive once through a scenario.
 
     Each cycle: scan at t_k, let the planner answer, meanwhile execute until t_{k+1} what was held
-    before. Ctrl-C ends it early, with what was done so far. Ends where the planner says the last goal is reached, or with the scenario's duration.
+    before. Ends where the planner says the last goal is reached, or with the scenario's duration,
+    or early by Ctrl-C with what was done so far.
 
     Args:
         scenario: a scenario, a shipped name, or the path of a YAML file.
