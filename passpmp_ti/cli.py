@@ -111,6 +111,8 @@ def _map(given: argparse.Namespace) -> int:
     heading = None if given.heading is None else math.radians(given.heading)
     found = region_map(scenario, given.speed, heading, seed=given.seed, after=given.time)
     path = Path(given.out)
+    if not path.suffix:
+        path = path.with_suffix(".png")
     path.parent.mkdir(parents=True, exist_ok=True)
     write_png(path, draw_region_map(found))
     print(map_report(found))
