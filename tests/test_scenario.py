@@ -6,8 +6,17 @@ import pytest
 from passpmp_ti.sim.scenario import load_scenario, shipped
 from passpmp_ti.sim.sources import RecordingSource
 
-SHIPPED = ["corridor", "corridor_person", "crowded", "dead_end", "eth", "narrow_passage", "simple",
-           "u_shape"]
+SHIPPED = [
+    "corridor",
+    "corridor_person",
+    "crowded",
+    "dead_end",
+    "eth",
+    "eth_stream",
+    "narrow_passage",
+    "simple",
+    "u_shape",
+]
 
 GOOD = """\
 robot: {type: differential}
@@ -50,7 +59,7 @@ def test_every_scenario_of_the_paper_is_shipped():
     assert shipped() == SHIPPED
 
 
-@pytest.mark.parametrize("name", [n for n in SHIPPED if n != "eth"])
+@pytest.mark.parametrize("name", [n for n in SHIPPED if not n.startswith("eth")])
 def test_a_shipped_scenario_builds_a_world_whose_start_is_clear_of_movers(name):
     scenario = load_scenario(name)
     world, state, start_time = scenario.build(seed=1)
@@ -152,7 +161,12 @@ def test_everything_wrong_is_told_at_once_with_its_line(file):
         load_scenario(path)
     told = str(refusal.value).splitlines()
     assert [line.split("mine.yaml:")[1].split(":")[0] for line in told] == [
-        "1", "3", "3", "6", "9", "10",
+        "1",
+        "3",
+        "3",
+        "6",
+        "9",
+        "10",
     ]
     assert "did you mean 'differential'" in told[0]
     assert any("beams must be >= 2" in line for line in told)
@@ -167,10 +181,19 @@ def test_a_missing_key_is_told(file):
         load_scenario(file(("goals: [[2, 0]]\n", "")))
 
 
-@pytest.mark.parametrize(("change", "told"), [
-    (("start: [0, 0, 0]", "start: [2.8, 0, 0]"), r"mine\.yaml:7: .*start: \(2\.8, 0\) is 0\.20 m"),
-    (("goals: [[2, 0]]", "goals: [[3.1, 0]]"), r"mine\.yaml:8: .*goals: \(3\.1, 0\) is 0\.10 m"),
-])
+@pytest.mark.parametrize(
+    ("change", "told"),
+    [
+        (
+            ("start: [0, 0, 0]", "start: [2.8, 0, 0]"),
+            r"mine\.yaml:7: .*start: \(2\.8, 0\) is 0\.20 m",
+        ),
+        (
+            ("goals: [[2, 0]]", "goals: [[3.1, 0]]"),
+            r"mine\.yaml:8: .*goals: \(3\.1, 0\) is 0\.10 m",
+        ),
+    ],
+)
 def test_a_start_or_goal_inside_a_wall_is_refused(file, change, told):
     with pytest.raises(ValueError, match=told):
         load_scenario(file(change))
@@ -182,10 +205,15 @@ def test_broken_yaml_is_told_with_its_line(file):
 
 
 def test_settings_that_only_fit_together_are_taken_together(file):
-    scenario = load_scenario(file(
-        ("duration: 10", "duration: 10\nsettings:\n  cycle: 0.15\n  time_step: 0.03"
-                         "\n  primitives: [0.3, 0.9]\n  blind_speed: 2.5\n  object_speed: 3.0")
-    ))
+    scenario = load_scenario(
+        file(
+            (
+                "duration: 10",
+                "duration: 10\nsettings:\n  cycle: 0.15\n  time_step: 0.03"
+                "\n  primitives: [0.3, 0.9]\n  blind_speed: 2.5\n  object_speed: 3.0",
+            )
+        )
+    )
     assert scenario.settings.cycle == 0.15
     assert scenario.settings.blind_speed == 2.5
 
@@ -200,8 +228,10 @@ def test_a_scenario_may_take_its_walls_from_a_map_beside_it(file, tmp_path):
     image[:, 30] = 0
     (tmp_path / "hall.pgm").write_bytes(b"P5 40 40 255\n" + image.tobytes())
     (tmp_path / "hall.yaml").write_text("image: hall.pgm\nresolution: 0.1\norigin: [0, -2, 0]\n")
-    scenario = load_scenario(file(
-        ("walls: [[3, -3, 3, 3]]", "map: hall.yaml"), ("duration", "static_map: true\nduration")
-    ))
+    scenario = load_scenario(
+        file(
+            ("walls: [[3, -3, 3, 3]]", "map: hall.yaml"), ("duration", "static_map: true\nduration")
+        )
+    )
     assert scenario.still_world().clearance(np.array([[0.0, 0.0]]))[0] == pytest.approx(3.0)
     assert scenario.static_map.resolution == 0.1
