@@ -63,6 +63,10 @@ class Settings:
     exploration_time: float | None = None
     """Time budget of the tree's growth [s], t_exploration of Algorithm 2; None: no budget."""
 
+    deadline: float | None = None
+    """Wall clock time within which a cycle must answer [s]: a plan that comes later is dropped, and
+    the robot goes on with what it holds. None: simulated time, no clock is looked at."""
+
     # the choice
     optimizer: str = "pso"
     """"pso" (Algorithm 3) or "exhaustive" (the true optimum over the leaves)."""
@@ -128,7 +132,7 @@ class Settings:
             "goal_tolerance",
         ):
             door.finite(name, field_, getattr(self, field_), above=0.0)
-        for field_ in ("blind_speed", "exploration_time"):
+        for field_ in ("blind_speed", "exploration_time", "deadline"):
             if getattr(self, field_) is not None:
                 door.finite(name, field_, getattr(self, field_), least=0.0)
         if self.cruise_speed is not None:

@@ -266,3 +266,12 @@ def test_goals_are_checked():
     for goal in ((), [(0.0, np.nan)], [(1.0, 2.0, 3.0)]):
         with pytest.raises(ValueError, match=r"Navigator\.goal"):
             Navigator(CHAIR, SETTINGS, goal)
+
+
+def test_a_plan_that_comes_after_the_deadline_is_dropped():
+    navigator = Navigator(CHAIR, SETTINGS.changed(deadline=0.0), (3.0, 0.0))
+    held = navigator.update(scan_at(REST, 1.0), REST)
+    assert navigator.record.decision == "held"
+    assert "deadline" in navigator.record.reason
+    assert CHAIR.at_rest(held.at(1e9))
+    assert held.states[-1, :2].tolist() == [0.0, 0.0]

@@ -127,7 +127,7 @@ class Navigator:
             position=(float(state[0]), float(state[1]), float(state[2])),
         )  # fmt: skip
         modelled = time.perf_counter()
-        record = self._decide(self.model, state, stamp)
+        record = self._decide(self.model, state, stamp, began)
         timings = {"model": modelled - began, **record.timings}
         timings["total"] = time.perf_counter() - began
         self.record = replace(record, timings=timings)
@@ -168,8 +168,10 @@ class Navigator:
             return "the robot's state is not known"
         return ""
 
-    def _decide(self, model: FutureModel, state: np.ndarray, stamp: float) -> CycleRecord:
-        """Choose what to hold from t_{k+1} on."""
+    def _decide(
+        self, model: FutureModel, state: np.ndarray, stamp: float, began: float
+    ) -> CycleRecord:
+        """Choose what to hold from t_{k+1} on; `began`: wall clock at the cycle's start."""
         assert self.held is not None
         settings = self.settings
         timings: dict[str, float] = {}
@@ -212,7 +214,12 @@ class Navigator:
             decision, reason = "held", "the held plan is at least as good"
             if cost_new < cost_held - TIE:
                 plan = trajectory_to(tree, leaf)
-                if still_clear(model, plan):
+                late = settings.deadline is not None and (
+                    time.perf_counter() - began > settings.deadline
+                )
+                if late:
+                    reason = "planning took longer than the deadline"
+                elif still_clear(model, plan):
                     self.held, decision, reason = plan, "new", ""
                 else:
                     reason = "the new plan did not stand its second check"
