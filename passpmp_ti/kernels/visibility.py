@@ -2,7 +2,7 @@
 
 Views are described in kernels/beams.py. A cell is seen when one view proves all of it empty. The
 border of what the views prove is walked piece by piece; a piece that is not shut marks the cells
-it touches as sources, unless another view proves its surroundings empty.
+it touches as sources, except where some view shows that no mover can be.
 """
 
 import taichi as ti
@@ -262,24 +262,33 @@ def mark_piece(
     v,
     scans,
     side,
-    x,
-    y,
-    grid: ti.template(),
+    r,
+    bearing,
+    outwards,
+    across,
     blind_apart,
     corner_i,
     corner_j,
     cell,
     tolerance,
 ):
-    """Mark the cell of one sample of a border piece, unless a view keeps movers out of there."""
-    inside = False
-    for w in range(view.shape[0]):
-        if not inside:
-            inside = keeps_out(view, beams[w], ranges, reach, far_side, w, x, y, tolerance, cell)
-    if not inside:
+    """Walk a border piece from (r, bearing), `outwards` metres and `across` radians, and mark the
+    cells that hold its samples, except where a view keeps movers out."""
+    pieces = ti.cast((outwards + r * across) / (0.25 * cell), ti.i32) + 1
+    for k in range(pieces + 1):
+        at_r = r + outwards * k / pieces
+        at_bearing = bearing + across * k / pieces
+        x = view[v, 0] + at_r * ti.cos(at_bearing)
+        y = view[v, 1] + at_r * ti.sin(at_bearing)
+        inside = False
+        for w in range(view.shape[0]):
+            if not inside:
+                inside = keeps_out(
+                    view, beams[w], ranges, reach, far_side, w, x, y, tolerance, cell
+                )
         i = ti.cast(ti.floor(x / cell), ti.i32) - corner_i
         j = ti.cast(ti.floor(y / cell), ti.i32) - corner_j
-        if i >= 0 and j >= 0 and i < grid[1] and j < grid[0]:
+        if not inside and i >= 0 and j >= 0 and i < marks.shape[2] and j < marks.shape[1]:
             apart = side == UNCOVERED or v >= scans
             if apart and blind_apart == 1 and not covered(view, beams, scans, x, y):
                 marks[BLIND_SOURCES, j, i] = ti.u8(0)
@@ -287,6 +296,17 @@ def mark_piece(
                 marks[SOURCES, j, i] = ti.u8(0)
                 if side == STANDING:
                     marks[STANDING_SOURCES, j, i] = ti.u8(0)
+
+
+@ti.func
+def lets_through(side, other):
+    """What the step between two wedges lets through, at least one of which is not shut."""
+    kind = OPEN
+    if side == STANDING or other == STANDING:
+        kind = STANDING
+    if side == UNCOVERED or other == UNCOVERED:
+        kind = UNCOVERED
+    return kind
 
 
 @ti.kernel
@@ -313,19 +333,34 @@ def mark_sources(
         beam = task % n_max
         n = beams[v]
         if beam < n:
-            grid = ti.Vector([marks.shape[1], marks.shape[2]])
-            pace = 0.25 * cell
             bearing = view[v, 2] + beam * view[v, 3]
+            angle = view[v, 3]
+            before = beam - 1
+            if beam == n - 1:
+                angle = view[v, 4]
+            if beam == 0:
+                before = n - 1
             side = far_side[v, beam]
-            r = reach[v, beam]
-            # the arc at the end of this wedge
-            if side != SHUT and r > 0.0:
-                angle = view[v, 3]
-                if beam == n - 1:
-                    angle = view[v, 4]
-                pieces = ti.cast(r * angle / pace, ti.i32) + 1
-                for k in range(pieces + 1):
-                    at = bearing + angle * k / pieces
+            other = far_side[v, before]
+            near = ti.min(reach[v, beam], reach[v, before])
+            far = ti.max(reach[v, beam], reach[v, before])
+            if (side == SHUT) != (other == SHUT) and met[v, beam] > 0:
+                # whoever stands in the shut wedge came along its face: the step goes up to it
+                far = ti.max(far, ranges[v, beam])
+            # the arc at the end of this wedge, and the step along this beam to the one before
+            for piece in range(2):
+                kind = side
+                r = reach[v, beam]
+                outwards = 0.0
+                across = angle
+                wanted = side != SHUT and r > 0.0
+                if piece == 1:
+                    kind = lets_through(side, other)
+                    r = near
+                    outwards = far - near
+                    across = 0.0
+                    wanted = (side != SHUT or other != SHUT) and far > near
+                if wanted:
                     mark_piece(
                         view,
                         beams,
@@ -335,63 +370,24 @@ def mark_sources(
                         marks,
                         v,
                         scans,
-                        side,
-                        view[v, 0] + r * ti.cos(at),
-                        view[v, 1] + r * ti.sin(at),
-                        grid,
+                        kind,
+                        r,
+                        bearing,
+                        outwards,
+                        across,
                         blind_apart,
                         corner_i,
                         corner_j,
                         cell,
                         tolerance,
                     )
-            # the step along this beam, between the wedge before it and the wedge after it
-            before = beam - 1
-            if before < 0:
-                before = n - 1
-            other = far_side[v, before]
-            if side != SHUT or other != SHUT:
-                near = ti.min(r, reach[v, before])
-                far = ti.max(r, reach[v, before])
-                if side == SHUT or other == SHUT:
-                    # what stands in the shut wedge may be reached along its face: up to the face
-                    if met[v, beam] > 0:
-                        far = ti.max(far, ranges[v, beam])
-                kind = OPEN
-                if side == STANDING or other == STANDING:
-                    kind = STANDING
-                if side == UNCOVERED or other == UNCOVERED:
-                    kind = UNCOVERED
-                pieces = ti.cast((far - near) / pace, ti.i32) + 1
-                if far > near:
-                    for k in range(pieces + 1):
-                        at = near + (far - near) * k / pieces
-                        mark_piece(
-                            view,
-                            beams,
-                            ranges,
-                            reach,
-                            far_side,
-                            marks,
-                            v,
-                            scans,
-                            kind,
-                            view[v, 0] + at * ti.cos(bearing),
-                            view[v, 1] + at * ti.sin(bearing),
-                            grid,
-                            blind_apart,
-                            corner_i,
-                            corner_j,
-                            cell,
-                            tolerance,
-                        )
             # the surface itself
             if met[v, beam] >= MOVABLE:
                 x = view[v, 0] + ranges[v, beam] * ti.cos(bearing)
                 y = view[v, 1] + ranges[v, beam] * ti.sin(bearing)
                 i = ti.cast(ti.floor(x / cell), ti.i32) - corner_i
                 j = ti.cast(ti.floor(y / cell), ti.i32) - corner_j
-                if i >= 0 and j >= 0 and i < grid[1] and j < grid[0]:
+                if i >= 0 and j >= 0 and i < marks.shape[2] and j < marks.shape[1]:
                     if met[v, beam] == STATIC:
                         marks[STATIC_CELLS, j, i] = ti.u8(0)
                     else:
