@@ -29,9 +29,10 @@ from passpmp_ti.scan import Scan
 from passpmp_ti.settings import Settings
 from passpmp_ti.trajectory import Trajectory
 
-TIE = 1e-5
-"""A new plan must cost less than the held one by more than this: the held one wins ties. Small
-against the least progress worth having, since a cost to go of a minute is no reason to stand."""
+TIE, TIE_SHARE = 1e-5, 3e-6
+"""A new plan must cost less than the held one by more than this, and by more than this share, which
+is what f32 sums can tell: the held one wins ties. Small against the least progress worth having,
+since a cost to go of a minute is no reason to stand."""
 COAST = 4.0
 """How far ahead the decision time looks [s]."""
 COAST_PACE = 0.1
@@ -212,7 +213,7 @@ class Navigator:
         decision, reason = "held", "no safe plan was found"
         if leaf != ROOT:
             decision, reason = "held", "the held plan is at least as good"
-            if cost_new < cost_held - TIE:
+            if cost_new < cost_held - max(TIE, TIE_SHARE * cost_held):
                 plan = trajectory_to(tree, leaf)
                 late = settings.deadline is not None and (
                     time.perf_counter() - began > settings.deadline
