@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -336,6 +337,12 @@ def _rasterise(views: Views, window: Window, settings: Settings) -> tuple[np.nda
     return seen, marks
 
 
+@functools.cache
+def _nothing_near(size: int) -> np.ndarray:
+    """[size, size] distances where nothing is marked anywhere; only ever read."""
+    return np.full((size, size), NO_SEED, dtype=np.float32)
+
+
 def _arrival(
     views: Views,
     seen: np.ndarray,
@@ -352,7 +359,7 @@ def _arrival(
     if blind_speed > 0 and not marks[BLIND_SOURCES].all():
         to_blind = distance_between_cells(marks[BLIND_SOURCES])
     else:
-        to_blind = np.full(seen.shape, NO_SEED, dtype=np.float32)
+        to_blind = _nothing_near(window.size)
     to_unseen = distance_between_cells(seen)
 
     clearance = settings.clearance(robot)

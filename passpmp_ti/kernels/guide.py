@@ -46,22 +46,26 @@ def sweep(
     rounds = 0
     ti.loop_config(serialize=True)
     for _ in range(1):
-        changed = 1
-        while changed == 1 and rounds < most_rounds:
-            changed = 0
+        quiet = 0  # sweeps in turn that changed nothing: after one of each order all is settled
+        while quiet < 4 and rounds < most_rounds:
             for direction in range(4):
-                for jj in range(rows):
-                    j = jj
-                    if direction % 2 == 1:
-                        j = rows - 1 - jj
-                    for ii in range(columns):
-                        i = ii
-                        if direction >= 2:
-                            i = columns - 1 - ii
-                        better = from_neighbours(time, j, i, slowness[j, i])
-                        if better < time[j, i] - 1e-4:
-                            time[j, i] = better
-                            changed = 1
+                changed = 0
+                if quiet < 4:
+                    for jj in range(rows):
+                        j = jj
+                        if direction % 2 == 1:
+                            j = rows - 1 - jj
+                        for ii in range(columns):
+                            i = ii
+                            if direction >= 2:
+                                i = columns - 1 - ii
+                            better = from_neighbours(time, j, i, slowness[j, i])
+                            if better < time[j, i] - 1e-4:
+                                time[j, i] = better
+                                changed = 1
+                    quiet += 1
+                    if changed == 1:
+                        quiet = 0
             rounds += 1
     return rounds
 

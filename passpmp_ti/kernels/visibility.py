@@ -83,8 +83,12 @@ def proves_cell(view: ti.template(), n, reach: ti.template(), v, x, y, cell):
     dx = x - view[v, 0]
     dy = y - view[v, 1]
     far = ti.sqrt((ti.abs(dx) + half) ** 2 + (ti.abs(dy) + half) ** 2) + SLACK
-    first, count = wedges_across(view, n, v, x, y, 0.7071068 * cell)
-    ok = True
+    # the wedge of its centre touches it for sure: most cells that are not seen end here
+    r = ti.sqrt(dx * dx + dy * dy)
+    ok = reach[v, wedge_at(view, n, v, ti.atan2(dy, dx))] >= r
+    first, count = 0, 0
+    if ok:
+        first, count = wedges_across(view, n, v, x, y, 0.7071068 * cell)
     k = 0
     while ok and k < count:
         w = first + k
@@ -167,18 +171,19 @@ def keeps_out(
     dx = x - view[v, 0]
     dy = y - view[v, 1]
     r = ti.sqrt(dx * dx + dy * dy)
-    bearing = ti.atan2(dy, dx)
-    kept = True
+    # beyond its range a view shows nothing
+    kept = r <= view[v, 5]
+    bearing = 0.0
+    if kept:
+        bearing = ti.atan2(dy, dx)
     # A place on this view's own border is not kept out, to the last bit of it: two views of one
     # sensor share their borders, and each must not rely on the other.
     for half in range(2):
-        w = wedge_at(view, n, v, bearing + (2 * half - 1) * BEARING_SLACK)
-        kept = kept and (
-            reach[v, w] >= r + 2.0 * SLACK
-            or (
-                far_side[v, w] == SHUT and before_wall(view, n, ranges, v, w, x, y, tolerance, cell)
-            )
-        )
+        if kept:
+            w = wedge_at(view, n, v, bearing + (2 * half - 1) * BEARING_SLACK)
+            kept = reach[v, w] >= r + 2.0 * SLACK
+            if not kept and far_side[v, w] == SHUT:
+                kept = before_wall(view, n, ranges, v, w, x, y, tolerance, cell)
     return kept
 
 
