@@ -74,6 +74,11 @@ class Robot:
         raise NotImplementedError
 
     @property
+    def top_acceleration(self) -> float:
+        """Bound on the acceleration of any disc's centre, curving way included [m/s^2]."""
+        raise NotImplementedError
+
+    @property
     def longest_braking(self) -> float:
         """T_h, the longest time that any control of the braking set takes to rest [s] (eq. 21)."""
         raise NotImplementedError
@@ -179,6 +184,15 @@ class CarLike(Robot):
         return self.v_max * math.tan(self.xi_max) / self.wheelbase
 
     @property
+    def top_acceleration(self) -> float:
+        # along, across, and the swing of an offset disc: theta'' = (a tan xi + v xi' / cos^2) / L
+        across = self.v_max * self.top_turn_rate
+        turning = self.acceleration * math.tan(self.xi_max)
+        turning += self.v_max * self.xi_rate / math.cos(self.xi_max) ** 2
+        swing = self.top_turn_rate**2 + turning / self.wheelbase
+        return self.acceleration + across + self.overhang * swing
+
+    @property
     def longest_braking(self) -> float:
         return self.v_max / self.acceleration
 
@@ -257,6 +271,13 @@ class DifferentialDrive(Robot):
     @property
     def top_turn_rate(self) -> float:
         return 2 * self.wheel_speed / self.track
+
+    @property
+    def top_acceleration(self) -> float:
+        # along, across ((v_r^2 - v_l^2) / 2 L at most), and the swing of an offset disc
+        across = self.wheel_speed**2 / (2 * self.track)
+        swing = self.top_turn_rate**2 + 2 * self.acceleration / self.track
+        return self.acceleration + across + self.overhang * swing
 
     @property
     def longest_braking(self) -> float:

@@ -12,6 +12,8 @@ MODES = ("conservative",)
 OPTIMIZERS = ("pso", "exhaustive")
 GUIDES = ("safe_time", "euclidean")
 DISTANCES = ("mean", "final")
+LOOK = 0.25
+"""How far a disc's centre may be from the nearest look at its path [cells]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -25,6 +27,9 @@ class Settings:
     """v_b, greatest speed of any object [m/s]; 0 is allowed: nothing moves."""
     object_width: float = 0.4
     """Objects are no narrower than this [m], and their corners no sharper than a right angle."""
+    object_radius: float = 0.0
+    """Every point of a moving object lies in a disc of this radius inside the object [m]: nothing
+    that moves hides where no such disc fits. 0: a point may hide in every sliver."""
     blind_speed: float | None = None
     """Greatest speed of what comes out of bearings that no sensor ever covers [m/s]; None: as
     `object_speed`; 0: what is there stands still."""
@@ -49,7 +54,7 @@ class Settings:
     window: int | None = None
     """Cells along each side of the grid; None: what the sensors' range asks for."""
     time_step: float = 0.02
-    """Time between the samples at which motions are checked [s]; an even number of ms."""
+    """Time between the samples at which motions are checked [s]; a whole number of ms."""
     layer_length: float = 0.1
     """Length of a layer of `FutureModel.layers` [s]; times are kept to 1 ms whatever this is."""
 
@@ -109,6 +114,7 @@ class Settings:
         door.choice(name, "distance", self.distance, DISTANCES)
         for field_ in (
             "object_speed",
+            "object_radius",
             "clear_radius",
             "tracking_error",
             "localisation_error",
@@ -165,10 +171,9 @@ class Settings:
                 f" {self.sub_swarms} of one size"
             )
         step_ms = self.time_step * 1000
-        if abs(step_ms - round(step_ms)) > 1e-6 or round(step_ms) % 2:
+        if abs(step_ms - round(step_ms)) > 1e-6:
             raise ValueError(
-                f"Settings.time_step must be an even number of milliseconds; got {step_ms:g} ms;"
-                " times are whole milliseconds and a sample speaks for half a step on either side"
+                f"Settings.time_step must be a whole number of milliseconds; got {step_ms:g} ms"
             )
         if isinstance(self.primitives, (str, bytes)) or not hasattr(self.primitives, "__iter__"):
             raise ValueError(f"Settings.primitives must be durations [s]; got {self.primitives!r}")
@@ -205,7 +210,8 @@ class Settings:
             own = dict(
                 object_speed=2.0,
                 object_width=0.4,
-                cell=0.05,
+                cell=0.04,
+                time_step=0.01,
                 cycle=0.1,
                 primitives=(0.4, 0.6, 1.0),
                 goal_tolerance=0.3,
@@ -255,17 +261,18 @@ class Settings:
             robot.disc_radius
             + self.tracking_error
             + 2 * self.localisation_error
-            + motion_margin(robot, self.time_step)
+            + motion_margin(robot, self)
             + integration_margin(robot, self.time_step)
         )
 
 
-def motion_margin(robot: Robot, time_step: float) -> float:
-    """How far a disc's centre can be from the nearest sample of its path [m].
+def motion_margin(robot: Robot, settings: Settings) -> float:
+    """How far a disc's centre can be from the nearest look at its path [m].
 
-    A sample speaks for half a step before and after it; an offset disc also swings.
+    Looks lie on the straight way between samples, `LOOK` cells to either side of each; the true way
+    leaves the straight one by at most a dt^2 / 8, a the greatest acceleration of a disc's centre.
     """
-    return 0.5 * time_step * (robot.top_speed + robot.top_turn_rate * robot.overhang)
+    return LOOK * settings.cell + robot.top_acceleration * settings.time_step**2 / 8
 
 
 def integration_margin(robot: Robot, time_step: float) -> float:

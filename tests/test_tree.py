@@ -5,9 +5,10 @@ import pytest
 from oracle import exact
 
 from passpmp_ti import CarLike, DifferentialDrive, FutureModel, Settings
+from passpmp_ti.grid.body import to_states
 from passpmp_ti.kernels.tree import FIRST
 from passpmp_ti.planner.guide import Guide
-from passpmp_ti.planner.tree import ROOT, TreeGrower
+from passpmp_ti.planner.tree import ROOT, TreeGrower, follow
 
 CHAIR, CAR = DifferentialDrive(), CarLike()
 CHAIR_SETTINGS = Settings.for_robot(
@@ -68,19 +69,21 @@ def test_times_are_absolute_and_grow_by_the_primitives(tree):
         assert min(abs(t - a) for a in allowed) < 1e-9
 
 
-def test_every_sample_of_every_primitive_is_free(tree):
+def test_every_primitive_is_free_all_the_way(tree):
     step, robot = tree.model.settings.time_step, tree.model.robot
     states = tree.states
     for node in range(1, tree.count):
         parent = tree.parent[node]
         if robot.at_rest(states[parent]) and robot.at_rest(states[node]):
             continue
-        points = tree.primitive(node)
-        assert points[0] == pytest.approx(states[parent, :2], abs=1e-5)
-        assert points[-1] == pytest.approx(states[node, :2], abs=1e-5)
-        times = tree.times[parent] + step * np.arange(len(points)) + 0.5 * step
-        moved = np.r_[True, np.abs(np.diff(points, axis=0)).max(axis=1) > 0]
-        assert not tree.model.occupied(points[moved], times[moved]).any()
+        path = to_states(
+            follow(tree.model, tree.pose[parent], tree.controls_to(node)[-1:]),
+            tree.model.window.anchor,
+        )
+        assert path[0] == pytest.approx(states[parent], abs=1e-5)
+        assert path[-1] == pytest.approx(states[node], abs=1e-5)
+        times = tree.times[parent] + step * np.arange(len(path))
+        assert not tree.model.touched(path, times).any()
 
 
 def test_what_brakes_ends_at_rest_and_is_a_leaf(tree):

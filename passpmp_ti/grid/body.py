@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from passpmp_ti.robots import Robot
-from passpmp_ti.settings import Settings
+from passpmp_ti.settings import LOOK, Settings
 
 MOST_DISCS = 8
 
@@ -31,11 +31,13 @@ class Body:
                 f"{type(robot).__name__}.discs has {len(robot.discs)} discs; the check takes at"
                 f" most {MOST_DISCS}: cover the body with fewer"
             )
-        numbers = np.zeros(16, dtype=np.float32)
+        numbers = np.zeros(18, dtype=np.float32)
         numbers[0] = 1 / settings.cell
         numbers[1] = settings.time_step
         numbers[2:8] = robot.parameters()
         numbers[8 : 8 + len(robot.discs)] = [offset for offset, _ in robot.discs]
+        numbers[16] = 0.5 / (LOOK * settings.cell)
+        numbers[17] = settings.object_speed * settings.time_step
         counts = np.zeros(8, dtype=np.int32)
         counts[4:8] = (
             settings.step_ms, len(robot.discs), len(robot.braking), len(robot.controls),

@@ -53,6 +53,7 @@ def _assumptions(before: Settings, now: Settings, robot: Robot) -> list[tuple[st
     return [
         ("object_speed", before.object_speed, now.object_speed),
         ("blind_speed", before.unseen_speed, now.unseen_speed),
+        ("object_radius", -before.object_radius, -now.object_radius),
         ("object_width", -before.object_width, -now.object_width),
         ("range_noise", before.range_noise, now.range_noise),
         ("stamp_error", before.stamp_error, now.stamp_error),

@@ -18,6 +18,7 @@ from passpmp_ti.grid.memory import (
     remembered_ticks,
     without_intruders,
 )
+from passpmp_ti.grid.opening import open_sources
 from passpmp_ti.grid.static_map import StaticMap
 from passpmp_ti.grid.view import Views, views_of
 from passpmp_ti.grid.window import Window, size_for
@@ -26,7 +27,7 @@ from passpmp_ti.kernels.arrival import (
     arrival_times,
 )
 from passpmp_ti.kernels.beams import SLACK
-from passpmp_ti.kernels.check import check_states
+from passpmp_ti.kernels.check import check_path, check_states
 from passpmp_ti.kernels.visibility import (
     BLIND_SOURCES,
     MOVABLE_CELLS,
@@ -243,6 +244,25 @@ class FutureModel:
             )
         return proof - 1
 
+    def touched(self, states: np.ndarray, times: np.ndarray) -> np.ndarray:
+        """Along a path, asked at the look-ups of the check: could anything touch the robot?
+
+        Args:
+            states: [n, 5] a time step apart.
+            times: [n] absolute [s], increasing.
+
+        Returns:
+            [n] bool: whether anything could on the way from each state to the next, on which the
+            robot moves. The last is False.
+        """
+        touched = np.zeros(len(states), dtype=np.int32)
+        poses = to_poses(states, self.window.anchor)
+        check_path(
+            self._body.kind, self.ticks, self._body.numbers, self.counts, poses,
+            self.ticks_of(times), touched,
+        )  # fmt: skip
+        return touched == 1
+
     def layer(self, index: int) -> np.ndarray:
         """[J, I] bool: cells that could be occupied at any moment of layer `index`.
 
@@ -334,6 +354,8 @@ def _rasterise(views: Views, window: Window, settings: Settings) -> tuple[np.nda
         views.view, views.beams, views.ranges, views.met, views.reach, views.far_side,
         views.scans, int(apart), i0, j0, window.cell, 2 * settings.range_noise + SLACK, marks,
     )  # fmt: skip
+    if settings.object_radius > 0:
+        open_sources(seen, marks, window.cell, settings.object_radius)
     return seen, marks
 
 

@@ -12,7 +12,7 @@ NEVER = 65535
 LATEST = 65534
 TICK_SLACK = 0.05  # [ticks] f32 rounding of a time must never free a cell
 
-SAMPLING = 0.5  # [cells] between what may come out and the nearest mark
+SAMPLING = 0.25  # [cells] between what may come out and the nearest mark
 
 Distances = ti.types.ndarray(dtype=ti.f32, ndim=2)  # [J, I] cells
 Arrival = ti.types.ndarray(dtype=ti.u16, ndim=2)  # [J, I] ticks
@@ -57,9 +57,9 @@ def arrival_times(
     # out
     arrival: Arrival,
 ):
-    # Distances are between cells, any point of either. A source's samples are a quarter of a cell
-    # apart, so where another view takes over, what comes out may do so a quarter of a cell from
-    # the last mark, and another quarter is forgiven behind a standing surface.
+    # Distances are between cells, any point of either. A source's samples are an eighth of a cell
+    # apart, so where another view takes over, what comes out may do so an eighth of a cell from
+    # the last mark, and another eighth is forgiven behind a standing surface.
     rounding = 1e-3 * cell + SLACK
     for j, i in arrival:
         ticks = 0

@@ -3,12 +3,14 @@
 The arrival map holds, for each cell [j, i], the number of milliseconds (ticks) after the model's
 base at which a robot disc centred anywhere in the cell could first be touched; 0: never free.
 
-A sample of a path speaks for half a time step before and after it. The motion in that time is
-inside the clearance that the map was grown by (`settings.motion_margin`); the time is judged at
-the interval's end, where the cones are widest. Both lean to the unsafe side.
+A time step is looked at as often as it takes, the more the faster the robot: each look speaks for
+a piece of the way, from whose middle no disc's centre is farther than the clearance that the map was
+grown by allows (`settings.motion_margin`), and is judged at the piece's end, when the cones are
+widest. Both lean to the unsafe side.
 
 Shared parameters:
-    numbers f32: 0 cells a metre, 1 time step [s], 2-7 robot (kernels/motion.py), 8-15 disc offsets
+    numbers f32: 0 cells a metre, 1 time step [s], 2-7 robot (kernels/motion.py), 8-15 disc offsets,
+        16 looks a metre, 17 way of the fastest object in a time step [m]
     counts i32: 0 i0, 1 j0 (cell of the map's corner), 2 columns, 3 rows, 4 ticks a step,
         5 discs, 6 braking controls, 7 tree controls
 """
@@ -47,16 +49,28 @@ def arrival_at(arrival: ti.template(), counts: ti.template(), scale, x, y):
 
 
 @ti.func
-def body_clear(arrival: ti.template(), numbers: ti.template(), counts: ti.template(), q, tick):
-    """Whether no disc of the body can be touched up to and including `tick`."""
+def way_clear(
+    arrival: ti.template(), numbers: ti.template(), counts: ti.template(), before, after, tick
+):
+    """Whether no disc of the body can be touched in the time step from `before`, at `tick`, on."""
     clear = True
     for d in range(counts[5]):
         offset = numbers[8 + d]
-        x = q[X] + offset * q[C]
-        y = q[Y] + offset * q[S]
-        ticks = arrival_at(arrival, counts, numbers[0], x, y)
-        if ticks <= tick and ticks != NEVER:
-            clear = False
+        x = before[X] + offset * before[C]
+        y = before[Y] + offset * before[S]
+        dx = after[X] + offset * after[C] - x
+        dy = after[Y] + offset * after[S] - y
+        # pieces short for the robot, and short in time for what comes towards it
+        way = ti.sqrt(dx * dx + dy * dy) + numbers[17]
+        looks = ti.max(ti.cast(ti.ceil(way * numbers[16]), ti.i32), 1)
+        k = 0
+        while clear and k < looks:
+            share = (k + 0.5) / looks
+            ticks = arrival_at(arrival, counts, numbers[0], x + share * dx, y + share * dy)
+            # the piece's end, rounded up
+            end = tick + ((k + 1) * counts[4] + looks - 1) // looks
+            clear = ticks > end or ticks == NEVER
+            k += 1
     return clear
 
 
@@ -84,16 +98,12 @@ def brakes_clear(
     """Whether braking by one control from `start`, itself included, touches nothing to rest."""
     q = start
     tick = start_tick
-    half = counts[4] // 2
     clear = True
-    moving = not at_rest(kind, q)
-    if moving:
-        clear = body_clear(arrival, numbers, counts, q, tick + half)
-    while moving and clear:
+    while clear and not at_rest(kind, q):
+        before = q
         q = step(kind, robot, q, control, 0.0, numbers[1])
+        clear = way_clear(arrival, numbers, counts, before, q, tick)
         tick += counts[4]
-        clear = body_clear(arrival, numbers, counts, q, tick + half)
-        moving = not at_rest(kind, q)
     return clear
 
 
@@ -124,7 +134,7 @@ def check_states(
     # in
     kind: ti.template(),
     arrival: Arrival,  # [J, I]
-    numbers: Numbers,  # [16]
+    numbers: Numbers,  # [18]
     counts: Counts,  # [8]
     braking: Table,  # [B, 3]
     poses: Table,  # [N, 7]
@@ -141,10 +151,35 @@ def check_states(
 
 
 @ti.kernel
+def check_path(
+    # in
+    kind: ti.template(),
+    arrival: Arrival,  # [J, I]
+    numbers: Numbers,  # [18]
+    counts: Counts,  # [8]
+    poses: Table,  # [N, 7], a time step apart
+    ticks: Counts,  # [N]
+    # out
+    touched: Counts,  # [N]: 1: something could touch the robot on its way to the next pose
+):
+    for n in range(poses.shape[0]):
+        touched[n] = 0
+        if n + 1 < poses.shape[0]:
+            before = pose7(0.0)
+            after = pose7(0.0)
+            for r in ti.static(range(7)):
+                before[r] = poses[n, r]
+                after[r] = poses[n + 1, r]
+            if not (at_rest(kind, before) and at_rest(kind, after)):
+                if not way_clear(arrival, numbers, counts, before, after, ticks[n]):
+                    touched[n] = 1
+
+
+@ti.kernel
 def trace(
     # in
     kind: ti.template(),
-    numbers: Numbers,  # [16]
+    numbers: Numbers,  # [18]
     start: Table,  # [N, 7]
     controls: Table,  # [N, M, 3] flattened to [N * M, 3]
     steps: Counts,  # [N * M]: steps of each control in turn; -1: until at rest

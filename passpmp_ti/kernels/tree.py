@@ -16,10 +16,10 @@ from passpmp_ti.kernels.check import (
     Counts,
     Numbers,
     Table,
-    body_clear,
     control_of,
     proving_brake,
     robot_of,
+    way_clear,
 )
 from passpmp_ti.kernels.guide import guide_at
 from passpmp_ti.kernels.motion import C, S, X, Y, at_rest, heading_for, pose7, step
@@ -80,7 +80,7 @@ def grow_level(
     guide: ti.types.ndarray(dtype=ti.f32, ndim=2),
     ahead: ti.types.ndarray(dtype=ti.f32, ndim=3),
     guide_frame: Numbers,  # [11]
-    numbers: Numbers,  # [16]
+    numbers: Numbers,  # [18]
     counts: Counts,  # [8]
     braking: Table,  # [B, 3]
     controls: Table,  # [U, 3]
@@ -107,7 +107,6 @@ def grow_level(
             robot = robot_of(numbers)
             q = pose_of(pose, parent)
             tick = link[parent, TICK]
-            half = counts[4] // 2
             control = control_of(controls, m % per_parent)
             direction = heading_for(kind, q)
             clear = True
@@ -119,12 +118,10 @@ def grow_level(
                     before = q
                     q = step(kind, robot, q, control, direction, numbers[1])
                     still = at_rest(kind, q)
-                    if resting and not still:
-                        # the wait was not checked, the moment of leaving is
-                        clear = body_clear(arrival, numbers, counts, before, tick + half)
+                    # waiting is not checked, leaving is
+                    if not (resting and still):
+                        clear = way_clear(arrival, numbers, counts, before, q, tick)
                     tick += counts[4]
-                    if clear and not (resting and still):
-                        clear = body_clear(arrival, numbers, counts, q, tick + half)
                     resting = still
                     if (k + 1) % pace == 0 or k + 1 == steps:
                         span = pace

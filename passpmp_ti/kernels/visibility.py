@@ -123,7 +123,7 @@ def before_wall(view: ti.template(), n, ranges: ti.template(), v, w, x, y, toler
     """Whether (x, y) is on the sensor's side of the surface that shuts wedge w of view v.
 
     The surface is known as the chord between two returns. Its true course may lie behind the
-    chord, in a corner, by half the chord's length; a quarter of a cell of that is forgiven, and
+    chord, in a corner, by half the chord's length; an eighth of a cell of that is forgiven, and
     charged in kernels/arrival.py.
     """
     a = view[v, 2] + w * view[v, 3]
@@ -143,7 +143,7 @@ def before_wall(view: ti.template(), n, ranges: ti.template(), v, w, x, y, toler
         px = x - view[v, 0] - ax
         py = y - view[v, 1] - ay
         length = ti.sqrt(bx * bx + by * by)
-        forgiven = tolerance + ti.min(0.5 * length, 0.25 * cell)
+        forgiven = tolerance + ti.min(0.5 * length, 0.125 * cell)
         # the sensor lies to the left of the way from a to b (bearings grow counter-clockwise)
         result = bx * py - by * px >= -forgiven * length
     return result
@@ -279,7 +279,7 @@ def mark_piece(
 ):
     """Walk a border piece from (r, bearing), `outwards` metres and `across` radians, and mark the
     cells that hold its samples, except where a view keeps movers out."""
-    pieces = ti.cast((outwards + r * across) / (0.25 * cell), ti.i32) + 1
+    pieces = ti.cast((outwards + r * across) / (0.125 * cell), ti.i32) + 1
     for k in range(pieces + 1):
         at_r = r + outwards * k / pieces
         at_bearing = bearing + across * k / pieces

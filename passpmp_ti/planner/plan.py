@@ -42,27 +42,14 @@ def still_clear(model: FutureModel, trajectory: Trajectory, since: float = -np.i
 
     A second opinion on the whole path, not a new proof at other times.
     """
-    return not touched(model, trajectory)[trajectory.times >= since - 1e-9].any()
+    ends = np.append(trajectory.times[1:], np.inf)
+    return not touched(model, trajectory)[ends > since + 1e-9].any()
 
 
 def touched(model: FutureModel, trajectory: Trajectory) -> np.ndarray:
-    """[m] bool: samples at which something could touch the moving robot.
-
-    The look-ups that verified it: each sample that the robot moves into or out of, judged half a
-    step later, for every disc of its body.
-    """
-    robot, states = model.robot, trajectory.states
-    resting = robot.at_rest(states)
-    moves = ~resting
-    moves[:-1] |= ~resting[1:]
-    moves[1:] |= ~resting[:-1]
-    result = np.zeros(len(states), dtype=bool)
-    times = np.maximum(trajectory.times[moves] + 0.5 * model.settings.time_step, model.stamp)
-    x, y, theta = states[moves, 0], states[moves, 1], states[moves, 2]
-    for offset, _ in robot.discs:
-        points = np.stack([x + offset * np.cos(theta), y + offset * np.sin(theta)], axis=1)
-        result[moves] |= model.occupied(points, times)
-    return result
+    """[m] bool: samples from which on something could touch the moving robot, by the look-ups that
+    verified it."""
+    return model.touched(trajectory.states, trajectory.times)
 
 
 def _as_trajectory(
