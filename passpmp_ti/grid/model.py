@@ -18,7 +18,7 @@ from passpmp_ti.grid.memory import (
     remembered_ticks,
     without_intruders,
 )
-from passpmp_ti.grid.opening import open_sources
+from passpmp_ti.grid.opening import opened_sources
 from passpmp_ti.grid.static_map import StaticMap
 from passpmp_ti.grid.view import Views, views_of
 from passpmp_ti.grid.window import Window, size_for
@@ -136,7 +136,14 @@ class FutureModel:
         seen, marks = _rasterise(views, window, settings)
         base = math.floor(stamp / TICK + 1e-6)
         body = Body.of(robot, settings)
-        ticks, broken = _arrival(views, seen, marks, window, base, robot, settings, previous)
+        opened = None
+        if settings.object_radius > 0:
+            opened = opened_sources(seen, marks, window.cell, settings.object_radius)
+        ticks, broken = _arrival(
+            views, seen, marks, opened, window, base, robot, settings, previous
+        )
+        if opened is not None:
+            marks = opened
         return cls(
             robot, settings, window, stamp, base, ticks, seen.view(bool), marks, views, broken, body
         )
@@ -354,8 +361,6 @@ def _rasterise(views: Views, window: Window, settings: Settings) -> tuple[np.nda
         views.view, views.beams, views.ranges, views.met, views.reach, views.far_side,
         views.scans, int(apart), i0, j0, window.cell, 2 * settings.range_noise + SLACK, marks,
     )  # fmt: skip
-    if settings.object_radius > 0:
-        open_sources(seen, marks, window.cell, settings.object_radius)
     return seen, marks
 
 
@@ -365,10 +370,19 @@ def _nothing_near(size: int) -> np.ndarray:
     return np.full((size, size), NO_SEED, dtype=np.float32)
 
 
+def _to_sources(marks: np.ndarray, blind_speed: float) -> tuple[np.ndarray, np.ndarray]:
+    """[J, I] distances to the nearest source, and to the nearest blind one [cells]."""
+    to_source = distance_between_cells(marks[SOURCES])
+    if blind_speed > 0 and not marks[BLIND_SOURCES].all():
+        return to_source, distance_between_cells(marks[BLIND_SOURCES])
+    return to_source, _nothing_near(len(to_source))
+
+
 def _arrival(
     views: Views,
     seen: np.ndarray,
     marks: np.ndarray,
+    opened: np.ndarray | None,
     window: Window,
     base: int,
     robot: Robot,
@@ -377,11 +391,11 @@ def _arrival(
 ) -> tuple[np.ndarray, np.ndarray]:
     """(ticks, broken premises): arrival times, never earlier than memory knows."""
     blind_speed = settings.unseen_speed
-    to_source = distance_between_cells(marks[SOURCES])
-    if blind_speed > 0 and not marks[BLIND_SOURCES].all():
-        to_blind = distance_between_cells(marks[BLIND_SOURCES])
-    else:
-        to_blind = _nothing_near(window.size)
+    to_source, to_blind = _to_sources(marks, blind_speed)
+    if opened is not None:
+        farther, blind_farther = _to_sources(opened, blind_speed)
+        to_source = np.maximum(to_source, farther)
+        to_blind = np.maximum(to_blind, blind_farther)
     to_unseen = distance_between_cells(seen)
 
     clearance = settings.clearance(robot)

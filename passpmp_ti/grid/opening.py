@@ -26,15 +26,21 @@ CELL_REACH = (math.sqrt(2) - 1) / 2
 centre to centre [cells]: half a diagonal more at one end, half a side less at the other."""
 
 
-def open_sources(seen: np.ndarray, marks: np.ndarray, cell: float, radius: float) -> None:
-    """Take from the sources what no object of at least `radius` can come out of.
+def opened_sources(seen: np.ndarray, marks: np.ndarray, cell: float, radius: float) -> np.ndarray:
+    """Marks whose sources are only what objects of at least `radius` can come out of.
 
     Args:
         seen: [J, I] uint8, 1: all of the cell proven empty.
-        marks: [5, J, I] uint8, 0 marks; the sources among them are changed in place.
+        marks: [5, J, I] uint8, 0 marks.
         cell: side of a cell [m].
         radius: every object is made of discs of at least this radius [m].
+
+    Returns:
+        [5, J, I] uint8; only the sources differ. What comes out of a sliver is marked where it
+        entered it, which a wall may hide from where it comes out: neither set of sources is nearer
+        than the other everywhere, and what arrives must have come by both.
     """
+    marks = marks.copy()
     opened = opened_region(seen, cell, radius)
     sliver, count = ndimage.label((seen == 0) & ~opened, ALL_ROUND)
     # a border lies along the edges of the cells that it bounds: look one cell around
@@ -49,6 +55,7 @@ def open_sources(seen: np.ndarray, marks: np.ndarray, cell: float, radius: float
         mouths = opened & _grown(leaky[sliver])
         marks[kind] = ~((marked & touching) | mouths)
     marks[STANDING_SOURCES] |= ~touching
+    return marks
 
 
 def opened_region(seen: np.ndarray, cell: float, radius: float) -> np.ndarray:
