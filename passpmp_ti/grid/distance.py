@@ -24,7 +24,11 @@ def distance_to_zeros(mask: np.ndarray) -> np.ndarray:
     cv2 = _opencv()
     if cv2 is not None:
         # only the precise mask is exact: 3x3 and 5x5 over-estimate by several cells
-        return cv2.distanceTransform(mask, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
+        distance = cv2.distanceTransform(mask, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
+        # its last bit differs from call to call; the square is a whole number
+        distance *= distance
+        np.rint(distance, out=distance)
+        return np.sqrt(distance, out=distance)
     return distance_without_opencv(mask)
 
 

@@ -104,6 +104,7 @@ def without_intruders(
     # whoever stands there reaches behind the surface that was seen
     grown = clearance + settings.object_width
     cap_memory(
-        distance_between_cells(mask), window.cell, grown, settings.object_speed, age, remembered
-    )
+        distance_between_cells(mask), window.cell, grown, settings.object_speed,
+        settings.stamp_error, age, remembered,
+    )  # fmt: skip
     return remembered

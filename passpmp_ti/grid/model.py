@@ -137,8 +137,11 @@ class FutureModel:
         base = math.floor(stamp / TICK + 1e-6)
         body = Body.of(robot, settings)
         opened = None
-        if settings.object_radius > 0:
-            opened = opened_sources(seen, marks, window.cell, settings.object_radius)
+        # Views whose poses err apart leave less of a disc hidden, by no more than one error; how far
+        # the rest of it reaches is inside the clearance, as the scan's error.
+        radius = settings.object_radius - settings.localisation_error
+        if radius > 0:
+            opened = opened_sources(seen, marks, window.cell, radius)
         ticks, broken = _arrival(
             views, seen, marks, opened, window, base, robot, settings, previous
         )

@@ -84,6 +84,12 @@ def views_of(
     reach = np.zeros((count, longest), dtype=np.float32)
     far_side = np.full((count, longest), wedges.OPEN, dtype=np.int32)
     map_cells, frame = _map_arrays(static_map, settings.map_tolerance, anchor)
+    by_map_width = 0.0
+    if static_map is not None:
+        # how far from a surface's true place a return may be that is taken for it
+        off = settings.map_tolerance + math.sqrt(2) * static_map.resolution
+        off += settings.range_noise + settings.localisation_error
+        by_map_width = settings.object_width - off
 
     for v, scan in enumerate(scans):
         n = len(scan.ranges)
@@ -107,8 +113,8 @@ def views_of(
                 r, view, v, int(closed), settings.object_width, map_cells, frame, labels
             )
         wedges.prove_wedges(
-            r, labels, view, v, int(closed), settings.object_width, settings.range_noise,
-            settings.cell, map_cells, frame, reach, far_side,
+            r, labels, view, v, int(closed), settings.object_width, by_map_width,
+            settings.range_noise, settings.cell, map_cells, frame, reach, far_side,
         )  # fmt: skip
         ranges[v, :n] = r
         met[v, :n] = labels

@@ -85,6 +85,7 @@ def cap_memory(
     cell: ti.f32,
     clearance: ti.f32,
     speed: ti.f32,
+    stamp_error: ti.f32,
     age: ti.i32,
     # in / out
     remembered: Arrival,
@@ -92,7 +93,7 @@ def cap_memory(
     """Let memory promise nothing that the intruders seen now could break."""
     for j, i in remembered:
         distance = to_intruder[j, i] * cell - SLACK - clearance
-        ticks = arrival_ticks(distance, speed, 0.0)
+        ticks = arrival_ticks(distance, speed, stamp_error)
         if ticks != NEVER:
             # counted from the old base, as the memory is
             ticks = ti.min(ticks + age, LATEST)

@@ -9,6 +9,9 @@ before the nearer of its two returns, unless
 
 A wedge whose far side is one surface that stays (both returns static and no farther apart than
 the narrowest object, or the map knows the wall between them) lets nothing through. All others do.
+Somebody who leans on a mapped wall may have one return that is taken for it. Another beam would meet
+him farther from the wall, unless the wedge is nearly as wide as he is: such a wedge the map does not
+shut.
 
 A view is a polar region: views of scans, and discs that are known to be empty (the robot's own
 body, a declared clearing). Rows of `view` (f32): 0 x, 1 y, 2 bearing of beam 0 in the world,
@@ -49,6 +52,12 @@ def mapped(map_static: ti.template(), frame: ti.template(), x, y):
         if i >= 0 and j >= 0 and i < map_static.shape[1] and j < map_static.shape[0]:
             result = map_static[j, i] != 0
     return result
+
+
+@ti.func
+def stays(label):
+    """Whether what a beam met is known to stay."""
+    return label == STATIC or label == STATIC_BY_MAP
 
 
 @ti.func
@@ -104,8 +113,6 @@ def label_by_map(
     for beam in range(n):
         if met[beam] == DOUBTED:
             met[beam] = MOVABLE
-        if met[beam] == STATIC_BY_MAP:
-            met[beam] = STATIC
 
 
 @ti.kernel
@@ -117,6 +124,7 @@ def prove_wedges(
     v: ti.i32,
     closed: ti.i32,  # 1: the beams go all the way round
     width: ti.f32,
+    by_map_width: ti.f32,  # of the widest wedge that what the map alone calls static may shut
     noise: ti.f32,
     cell: ti.f32,
     map_static: Bytes2,
@@ -159,7 +167,9 @@ def prove_wedges(
             # cos x - sin x > 1 - x - x^2 / 2. Noise: each range may be this much too long.
             half = 0.5 * angle
             proven = ti.max(limit * (1.0 - half - 0.5 * half * half) - noise - SLACK, 0.0)
-            if met[a] == STATIC and met[b] == STATIC and limit == far:
+            by_map = met[a] == STATIC_BY_MAP or met[b] == STATIC_BY_MAP
+            narrow = not by_map or ti.max(ranges[a], ranges[b]) * angle <= by_map_width
+            if stays(met[a]) and stays(met[b]) and limit == far and narrow:
                 xa = end_x(view, v, a, ranges[a])
                 ya = end_y(view, v, a, ranges[a])
                 dx = end_x(view, v, b, ranges[b]) - xa
@@ -180,7 +190,7 @@ def prove_wedges(
                 near = a
                 if ranges[b] < ranges[a]:
                     near = b
-                if met[near] == STATIC and ti.abs(ranges[a] - ranges[b]) > width:
+                if stays(met[near]) and ti.abs(ranges[a] - ranges[b]) > width:
                     side = STANDING
         reach[v, beam] = proven
         far_side[v, beam] = side

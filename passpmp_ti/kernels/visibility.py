@@ -7,7 +7,7 @@ it touches as sources, except where some view shows that no mover can be.
 
 import taichi as ti
 
-from passpmp_ti.kernels.beams import MOVABLE, OPEN, SHUT, SLACK, STANDING, STATIC, UNCOVERED
+from passpmp_ti.kernels.beams import MOVABLE, OPEN, SHUT, SLACK, STANDING, UNCOVERED, stays
 
 TAU = 6.2831853
 BLOCK = 8  # cells along the side of a block that is first judged as a whole
@@ -251,7 +251,8 @@ def covered(view: ti.template(), beams: ti.template(), scans, x, y):
     for v in range(scans):
         relative = ti.atan2(y - view[v, 1], x - view[v, 0]) - view[v, 2]
         relative -= TAU * ti.floor(relative / TAU)
-        if relative < (beams[v] - 1) * view[v, 3] - BEARING_SLACK:
+        # the edges of the field belong to what lies beyond them
+        if BEARING_SLACK < relative < (beams[v] - 1) * view[v, 3] - BEARING_SLACK:
             result = True
     return result
 
@@ -393,7 +394,7 @@ def mark_sources(
                 i = ti.cast(ti.floor(x / cell), ti.i32) - corner_i
                 j = ti.cast(ti.floor(y / cell), ti.i32) - corner_j
                 if i >= 0 and j >= 0 and i < marks.shape[2] and j < marks.shape[1]:
-                    if met[v, beam] == STATIC:
+                    if stays(met[v, beam]):
                         marks[STATIC_CELLS, j, i] = ti.u8(0)
                     else:
                         marks[MOVABLE_CELLS, j, i] = ti.u8(0)
