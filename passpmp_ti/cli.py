@@ -9,16 +9,16 @@ import json
 import math
 import os
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from passpmp_ti import door
+
 if TYPE_CHECKING:
     from passpmp_ti.sim.scenario import Scenario
-    from passpmp_ti.viz.outcome import Outcome
-    from passpmp_ti.viz.report import Progress
 
-BAD_INPUT, INTERRUPTED = 2, 130
+FAILED, BAD_INPUT, INTERRUPTED = 1, 2, 130
 """Exit codes."""
 
 # Heavy imports stand inside the subcommands: `passpmp --help` answers at once.
@@ -43,17 +43,21 @@ def _run(given: argparse.Namespace) -> int:
 
     scenario = _scenario(given)
     seeds = given.seeds or [given.seed]
-    if given.out:
-        Path(given.out).mkdir(parents=True, exist_ok=True)
+    for folder in filter(None, (given.out, given.certificates)):
+        Path(folder).mkdir(parents=True, exist_ok=True)
     summaries: list[Mapping[str, Any]] = []
     interrupted = False
     for seed in seeds:
         progress = Progress()
-        out = None
-        if given.out:
-            out = Path(given.out) if len(seeds) == 1 else Path(given.out) / f"seed-{seed}"
+        out, certificates = (
+            None if not folder else Path(folder) / (f"seed-{seed}" if len(seeds) > 1 else "")
+            for folder in (given.out, given.certificates)
+        )
+        watchers: list[Callable[[Any], None]] = [progress.see]
+        if certificates is not None:
+            watchers.append(_certifying(certificates, given.certify_every))
         try:
-            summaries.append(_drive(scenario, seed, progress, out, not given.no_video))
+            summaries.append(_drive(scenario, seed, watchers, out, not given.no_video))
         except KeyboardInterrupt:
             interrupted = True
         finally:
@@ -72,33 +76,56 @@ def _run(given: argparse.Namespace) -> int:
         )
     if given.out:
         print(f"\nwritten to {given.out}")
+    if given.certificates:
+        print(f"certificates: {given.certificates}")
     return INTERRUPTED if interrupted else 0
 
 
 def _drive(
-    scenario: Scenario, seed: int, progress: Progress, out: Path | None, video: bool
+    scenario: Scenario,
+    seed: int,
+    watchers: Sequence[Callable[[Any], None]],
+    out: Path | None,
+    video: bool,
 ) -> Mapping[str, Any]:
     """One episode, watched; what was seen is written even if it is cut short."""
     from passpmp_ti.sim.episode import simulate
 
     _start()
     if out is None:
-        return simulate(scenario, seed=seed, on_cycle=progress.see).summary()
+        return simulate(scenario, seed=seed, on_cycle=_all(*watchers)).summary()
     from passpmp_ti.viz.outcome import Outcome
 
     settings = scenario.settings
     detail = f"seed {seed} · objects ≤ {settings.object_speed:.3g} m/s · cycle {settings.cycle:g} s"
     with Outcome(out, scenario.name, detail, video=video) as outcome:
-        episode = simulate(scenario, seed=seed, on_cycle=_both(progress, outcome))
+        episode = simulate(scenario, seed=seed, on_cycle=_all(*watchers, outcome.see))
         return outcome.finish(episode)
 
 
-def _both(progress: Progress, outcome: Outcome) -> Any:
+def _all(*watchers: Callable[[Any], None]) -> Callable[[Any], None]:
     def see(info: Any) -> None:
-        progress.see(info)
-        outcome.see(info)
+        for watcher in watchers:
+            watcher(info)
 
     return see
+
+
+def _certifying(folder: Path, every: int) -> Callable[[Any], None]:
+    from passpmp_ti.certificate.writer import CertificateWriter
+
+    writer = CertificateWriter(folder, every=every)
+
+    def see(info: Any) -> None:
+        writer.see(info.scans, info.state, info.navigator)
+
+    return see
+
+
+def _verify(given: argparse.Namespace) -> int:
+    from passpmp_verify.__main__ import check
+
+    return check(given.files)
 
 
 def _map(given: argparse.Namespace) -> int:
@@ -133,6 +160,98 @@ def _bench_cycle(given: argparse.Namespace) -> int:
     return 0
 
 
+def _attack(given: argparse.Namespace) -> int:
+    if given.replay:
+        return _replay(given)
+    from passpmp_ti.attack.campaign import (
+        EPISODES,
+        Campaign,
+        carry_out_all,
+        default_kinds,
+        failed,
+        read_results,
+    )
+    from passpmp_ti.attack.case import KINDS, ROBOTS
+    from passpmp_ti.attack.progress import CampaignProgress
+    from passpmp_ti.attack.report import markdown, write_report
+
+    robots = ROBOTS if given.robot == "both" else (given.robot,)
+    kinds = tuple(given.kinds.split(",")) if given.kinds else default_kinds()
+    for kind in kinds:
+        door.choice("attack", "kinds", kind, KINDS)
+    workers = door.whole("attack", "workers", given.workers or os.cpu_count() or 1, least=1)
+    campaign = Campaign(
+        robots=robots,
+        kinds=kinds,
+        episodes=given.episodes if given.episodes or given.cycles else 2 * len(kinds),
+        cycles=given.cycles,
+        seed=given.seed,
+        duration=given.duration,
+        cheat_speed=given.cheat_speed,
+        changes=dict(_assignment(text) for text in given.set or ()),
+    )
+    folder = Path(given.out)
+    if (folder / EPISODES).exists() and not given.resume:
+        raise ValueError(f"{folder} holds a campaign; go on with --resume, or choose another --out")
+    progress = CampaignProgress(campaign, read_results(folder))
+    interrupted = False
+    try:
+        carry_out_all(campaign, folder, workers, progress.see)
+    except KeyboardInterrupt:
+        interrupted = True
+    finally:
+        progress.end()
+    results = read_results(folder)
+    told = write_report(results, folder, "Attacks on the guarantee")
+    print(markdown(told, "Attacks on the guarantee"))
+    print(f"written to {folder}")
+    if interrupted:
+        print("passpmp: interrupted; the same command with --resume goes on", file=sys.stderr)
+        return INTERRUPTED
+    return FAILED if any(failed(r) for r in results) else 0
+
+
+def _replay(given: argparse.Namespace) -> int:
+    from passpmp_ti.attack.replay import replay
+    from passpmp_ti.viz.report import table
+
+    _start(threads=1)
+    out = Path(given.out) / Path(given.replay).stem
+    now, same = replay(Path(given.replay), None if given.no_video else out)
+    print(table([(key, str(value)) for key, value in now.items()], left=2))
+    print("the same to the last bit" if same else "NOT the same as was written")
+    if not given.no_video:
+        print(f"written to {out}")
+    return 0 if same else FAILED
+
+
+def _faults(given: argparse.Namespace) -> int:
+    from passpmp_ti.faults.campaign import ROBOTS, run_faults
+    from passpmp_ti.faults.report import markdown
+
+    robots = ROBOTS if given.robot == "both" else (given.robot,)
+
+    def progress(done: int, of: int, standing: str) -> None:
+        print(f"\r{done} of {of} drives, {standing}  ", end="", file=sys.stderr, flush=True)
+
+    found = run_faults(
+        robots,
+        given.times,
+        premises=given.premises,
+        workers=given.workers or os.cpu_count() or 1,
+        seed=given.seed,
+        out=given.out,
+        progress=progress,
+    )
+    print(file=sys.stderr)
+    print(markdown(found))
+    if given.out:
+        print(f"written to {given.out}")
+    if found.jobs < found.of:
+        return INTERRUPTED
+    return FAILED if found.failures else 0
+
+
 def _scenarios(_: argparse.Namespace) -> int:
     import yaml
 
@@ -145,12 +264,12 @@ def _scenarios(_: argparse.Namespace) -> int:
     return 0
 
 
-def _start() -> None:
+def _start(threads: int | None = None) -> None:
     """Start the kernels; Taichi greets on standard output, which belongs to the results."""
     from passpmp_ti import backend
 
     with contextlib.redirect_stdout(io.StringIO()):
-        backend.init()
+        backend.init(threads=threads)
 
 
 def _scenario(given: argparse.Namespace) -> Scenario:
@@ -210,6 +329,12 @@ def _parser() -> argparse.ArgumentParser:
     run.add_argument("--seeds", type=_seeds, metavar="A-B", help="several seeds, one after another")
     run.add_argument("--out", metavar="DIR", help="leave video, snapshots, summary and arrays here")
     run.add_argument("--no-video", action="store_true", help="with --out: no video")
+    run.add_argument(
+        "--certificates", metavar="DIR", help="leave a certificate of each cycle here"
+    )
+    run.add_argument(
+        "--certify-every", type=int, default=1, metavar="N", help="of each n-th cycle (default: 1)"
+    )
 
     region = _command(
         commands,
@@ -263,10 +388,80 @@ def _parser() -> argparse.ArgumentParser:
     )
     cycle.add_argument("--json", metavar="FILE", help="write the figures there")
 
+    _attack_options(
+        _command(
+            commands,
+            "attack",
+            "let movers hunt the robot, and count what they achieve",
+            _attack,
+            "passpmp attack --robot both --cycles 100000 --workers 2 --out out/attack",
+        )
+    )
+    faults = _command(
+        commands,
+        "faults",
+        "put faults of sensors, clocks and the planner into running cycles, or break premises",
+        _faults,
+        "passpmp faults --times 1000 --workers 2 --out out/faults",
+    )
+    faults.add_argument(
+        "--robot", choices=("car", "wheelchair", "both"), default="both", help="(default: both)"
+    )
+    faults.add_argument(
+        "--times", type=int, default=10, metavar="N", help="of each kind and robot (default: 10)"
+    )
+    faults.add_argument(
+        "--premises", action="store_true", help="break premises instead of putting in faults"
+    )
+    faults.add_argument(
+        "--workers", type=int, metavar="K", help="processes at once (default: one a CPU)"
+    )
+    faults.add_argument("--seed", type=int, default=1, metavar="N", help="(default: 1)")
+    faults.add_argument("--out", metavar="DIR", help="leave the tables and the counts here")
+
+    verify = _command(
+        commands,
+        "verify",
+        "check certificates by a verifier that shares nothing with the planner",
+        _verify,
+        "passpmp verify out/certificates/*.json",
+    )
+    verify.add_argument("files", nargs="+", metavar="FILE", help="a certificate")
     _command(
         commands, "scenarios", "list the scenarios that come along", _scenarios, "passpmp scenarios"
     )
     return parser
+
+
+def _attack_options(parser: argparse.ArgumentParser) -> None:
+    add = parser.add_argument
+    add("--robot", choices=("car", "wheelchair", "both"), default="both", help="(default: both)")
+    amount = parser.add_mutually_exclusive_group()
+    amount.add_argument("--episodes", type=int, metavar="N", help="per robot")
+    amount.add_argument("--cycles", type=int, metavar="N", help="per robot; episodes are finished")
+    add(
+        "--kinds",
+        metavar="A,B",
+        help="intercept, ambush, rim, cut-in, crowd, shadow, mixed, walkers (default: all but"
+        " walkers)",
+    )
+    add("--workers", type=int, metavar="K", help="processes at once (default: one a CPU)")
+    add("--seed", type=int, default=0, metavar="N", help="of the first episode (default: 0)")
+    add("--duration", type=float, default=45.0, metavar="S", help="of an episode [s] (default: 45)")
+    add("--out", default="out/attack", metavar="DIR", help="(default: out/attack)")
+    add("--resume", action="store_true", help="go on with what DIR holds")
+    add(
+        "--set", action="append", metavar="FIELD=VALUE", help="a field of Settings; may be repeated"
+    )
+    add(
+        "--cheat-speed",
+        type=float,
+        default=1.0,
+        metavar="F",
+        help="a check of the harness: movers F times as fast as declared",
+    )
+    add("--replay", metavar="FILE", help="carry out one written episode again and draw it")
+    add("--no-video", action="store_true", help="with --replay: draw nothing")
 
 
 def _command(

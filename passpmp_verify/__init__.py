@@ -1,0 +1,1 @@
+"""Checks certificates of passive safety with NumPy alone: no planner, no grid, no Taichi."""
