@@ -5,6 +5,7 @@ import pytest
 from oracle import exact
 
 from passpmp_ti import CarLike, DifferentialDrive, Navigator, Scan, Settings
+from passpmp_ti.faults.kinds import INSIDE, broken_inside
 
 CHAIR = DifferentialDrive()
 SETTINGS = Settings.for_robot(
@@ -211,6 +212,224 @@ def test_a_robot_off_its_plan_brakes_from_where_it_is():
     assert "off its plan" in navigator.record.reason
     assert navigator.record.deviation == pytest.approx(0.4, abs=1e-6)
     assert CHAIR.at_rest(held.states[-1])
+
+
+def on(navigator, stamp, state, cycles, world=OPEN, shift=0.0):
+    """Follow what is held for some cycles, stamps off by `shift`; yields each record."""
+    held_shift = 0.0
+    for _ in range(cycles):
+        before = navigator.held
+        after = navigator.update(scan_at(state, stamp + shift, world), state)
+        yield navigator.record, state
+        stamp += CYCLE
+        if after is not before:
+            state, held_shift = before.at(stamp + held_shift), shift
+            assert after.at(stamp + shift) == pytest.approx(state, abs=1e-6)
+        else:
+            state = before.at(stamp + held_shift)
+
+
+@pytest.mark.parametrize(
+    "rubbish", [None, 3, "scan", [None], [np.zeros(3)], object(), (), np.zeros(4)]
+)
+def test_what_is_no_scan_is_no_scan(rubbish):
+    navigator, stamp, state = underway()
+    held = navigator.held
+    assert navigator.update(rubbish, state) is held
+    assert "no scan" in navigator.record.lost_scan
+    navigator.update(scan_at(state, stamp), state)
+    assert not navigator.record.lost_scan
+    with pytest.raises(ValueError, match="needs a scan"):
+        Navigator(CHAIR, SETTINGS, (1.0, 0.0)).update(rubbish, REST)
+
+
+@pytest.mark.parametrize("stamp", [1e300, -1e300, 1e15])
+def test_a_stamp_that_no_clock_says_is_not_used(stamp):
+    navigator, now, state = underway()
+    held = navigator.held
+    assert navigator.update(scan_at(state, stamp), state) is held
+    assert "clock" in navigator.record.lost_scan
+    navigator.update(scan_at(state, now), state)
+    assert not navigator.record.lost_scan
+
+
+def test_a_scan_that_comes_late_is_planned_with_while_it_is_news():
+    navigator, stamp, state = underway()
+    held, late = navigator.held, stamp - 0.4 * CYCLE
+    then = held.at(late) if held.start <= late else None
+    assert then is None  # what is held begins after that scan: the road before it is remembered
+    navigator.update(scan_at(state, stamp), state)
+    middle = navigator.held.at(stamp + 0.6 * CYCLE)
+    navigator.update(scan_at(middle, stamp + 0.6 * CYCLE), middle)
+    assert not navigator.record.lost_scan
+    assert navigator.record.deviation < 0.01
+
+
+def test_an_old_scan_in_between_changes_nothing_where_the_robots_place_tells_the_time():
+    navigator, stamp, state = underway()
+    held = navigator.held
+    old = scan_at(state, stamp - 3 * CYCLE)
+    assert navigator.update(old, state) is held
+    assert "not newer" in navigator.record.lost_scan
+    for record, _ in on(navigator, stamp, state, 3):
+        assert not record.lost_scan
+        assert not record.forgot
+
+
+def test_an_old_scan_before_a_robot_at_rest_costs_its_memory():
+    # nobody can tell whether the clock was put back and has caught up
+    navigator = Navigator(CHAIR, SETTINGS, (0.0, 0.0))
+    for stamp in (1.0, 1.1, 1.05):
+        navigator.update(scan_at(REST, stamp), REST)
+    assert navigator.record.lost_scan
+    navigator.update(scan_at(REST, 1.2), REST)
+    assert "put back" in navigator.record.forgot
+    navigator.update(scan_at(REST, 1.3), REST)
+    assert not navigator.record.forgot
+
+
+def test_a_clock_that_is_put_back_brings_the_robot_to_rest_and_is_believed_then():
+    navigator, stamp, state = underway(goal=(40.0, 0.0))
+    records = list(on(navigator, stamp, state, 60, shift=-300.0))
+    rested = [k for k, (_, at) in enumerate(records) if CHAIR.at_rest(at)]
+    believed = [k for k, (record, _) in enumerate(records) if not record.lost_scan]
+    assert all("clock" in record.lost_scan for record, _ in records[: believed[0]])
+    assert rested[0] <= believed[0]
+    assert "clock" in records[believed[0]][0].forgot
+    assert not any(record.lost_scan for record, _ in records[believed[0] :])
+    assert not CHAIR.at_rest(records[-1][1])
+
+
+def test_a_clock_that_jumps_forward_is_answered_from_where_the_robot_is():
+    for jump in (0.35, 3.0, 300.0):
+        navigator, stamp, state = underway()
+        records = [record for record, _ in on(navigator, stamp, state, 40, shift=jump)]
+        assert records[0].decision == "brake" or "clock" in records[0].lost_scan
+        assert not records[-1].lost_scan
+
+
+def test_a_long_pause_at_rest_is_no_jump():
+    navigator = Navigator(CHAIR, SETTINGS, (3.0, 0.0))
+    navigator.update(scan_at(REST, 0.0), REST)
+    still = Navigator(CHAIR, SETTINGS, (0.0, 0.0))
+    still.update(scan_at(REST, 0.0), REST)
+    still.update(scan_at(REST, 30.0), REST)
+    assert not still.record.lost_scan
+    assert not still.record.forgot
+    still.update(scan_at(REST, 130.0), REST)
+    assert "long ago" in still.record.forgot
+
+
+@pytest.mark.parametrize("jump", [(0.0, 3.0, 0.0), (-2.0, 1.0, 2.0), (0.0, 0.0, 0.4)])
+def test_a_pose_that_jumps_costs_the_memory_and_the_robot_brakes_from_where_it_will_be(jump):
+    navigator, stamp, state = underway()
+    going = navigator.held
+    off = state + np.array([*jump, 0.0, 0.0])
+    held = navigator.update(scan_at(off, stamp), off)
+    assert navigator.record.decision == "brake"
+    assert "off its plan" in navigator.record.reason
+    assert "off its plan" in navigator.record.forgot
+    assert held.start == pytest.approx(stamp + CYCLE)
+    # the robot's own motion is what it was: a cycle of what it followed, laid at the new place
+    c, s = np.cos(jump[2]), np.sin(jump[2])
+    way = going.at(stamp + CYCLE)[:2] - going.at(stamp)[:2]
+    there = off[:2] + np.array([c * way[0] - s * way[1], s * way[0] + c * way[1]])
+    assert held.states[0, :2] == pytest.approx(there, abs=1e-5)
+    assert held.states[0, 3:] == pytest.approx(going.at(stamp + CYCLE)[3:], abs=1e-5)
+    after = held.at(stamp + CYCLE)
+    navigator.update(scan_at(after, stamp + CYCLE), after)
+    assert not navigator.record.forgot
+    assert navigator.record.deviation < 1e-6
+
+
+def test_a_sensor_that_is_not_where_it_sits_is_not_used():
+    navigator, stamp, state = underway()
+    held = navigator.held
+    for off in ([1.0, 0, 0], [0, 0, 0.5]):
+        elsewhere = state + np.array([*off, 0, 0])
+        assert navigator.update(scan_at(elsewhere, stamp), state) is held
+        assert "does not fit" in navigator.record.lost_scan
+        assert navigator.update(scan_at(state, stamp), elsewhere) is held
+        assert "does not fit" in navigator.record.lost_scan
+    far = state + np.array([5e3, 0, 0, 0, 0])
+    assert navigator.update(scan_at(far, stamp), far) is held
+    assert "cannot be" in navigator.record.lost_scan
+
+
+def test_a_sensor_that_sees_nothing_any_more_is_not_believed():
+    world = exact.world_of([exact.box(3.5, y, 1.0, 1.0) for y in (-3.0, -1.5, 1.5, 3.0)])
+    navigator, stamp, state = underway(world, goal=(2.0, 0.0))
+    held, model = navigator.held, navigator.model
+    blind = Scan(np.full(360, 1e9), -np.pi, 2 * np.pi / 360, 6.0, tuple(state[:3]), stamp)
+    assert navigator.update(blind, state) is held
+    assert "are gone" in navigator.record.lost_scan
+    assert navigator.model is model
+    stamp += CYCLE
+    state = held.at(stamp)
+    navigator.update(scan_at(state, stamp, world), state)
+    assert not navigator.record.lost_scan
+
+
+@pytest.mark.parametrize("where", list(INSIDE))
+def test_a_planner_that_raises_has_found_no_plan(where):
+    navigator, stamp, state = underway()
+    for _ in range(8):  # until there is a new plan that could raise
+        held, model = navigator.held, navigator.model
+        with broken_inside(where, np.random.default_rng(0)):
+            after = navigator.update(scan_at(state, stamp), state)
+        assert after is held
+        if navigator.record.fault:
+            break
+        stamp += CYCLE
+        state = held.at(stamp)
+    assert "fault harness" in navigator.record.fault
+    assert navigator.record.decision == "held"
+    assert navigator.record.timings["total"] > 0
+    if where in ("model", "second check"):
+        assert navigator.model is model
+    else:
+        assert navigator.model.stamp == stamp
+    stamp += CYCLE
+    state = held.at(stamp)
+    navigator.update(scan_at(state, stamp), state)
+    assert not navigator.record.fault
+    assert navigator.record.deviation < 1e-6
+
+
+def test_an_answer_that_was_not_taken_is_forgotten():
+    navigator, stamp, state = underway()
+    taken = navigator.held
+    for _ in range(8):  # until an answer is another one
+        dropped = navigator.update(scan_at(state, stamp), state)
+        stamp += CYCLE
+        if dropped is not taken:
+            break
+        state = taken.at(stamp)
+    assert dropped is not taken
+    state = taken.at(stamp)
+    navigator.update(scan_at(state, stamp), state, following=taken)
+    assert navigator.record.not_taken
+    assert navigator.record.deviation < 1e-6
+    assert navigator.held.start in (taken.start, pytest.approx(stamp + CYCLE))
+    navigator.update(scan_at(state, stamp + CYCLE), state, following="nothing")
+    assert "Trajectory" in navigator.record.fault
+
+
+def test_the_clear_disc_is_declared_about_the_start_only():
+    settings = SETTINGS.changed(clear_radius=1.0)
+    navigator = Navigator(CHAIR, settings, (0.0, 0.0))
+
+    def seen_behind(state, stamp):
+        scan = exact.sweep(OPEN, tuple(state[:3]), 180, np.pi, 6.0, stamp)
+        navigator.update(scan, state)
+        model = navigator.model
+        j, i = np.floor((state[1::-1] - np.array(model.origin)[::-1]) / model.cell).astype(int)
+        return model.seen[j, i - 7]
+
+    assert seen_behind(REST, 0.0)
+    elsewhere = REST + np.array([0, 30.0, 0, 0, 0])
+    assert not seen_behind(elsewhere, 0.1)
+    assert "off its plan" in navigator.record.forgot
 
 
 # the record -----------------------------------------------------------------------------------

@@ -131,87 +131,6 @@ def sweep_blocked(start, end, radius, world):
     return meets | (near < radius - 1e-9) | inside_boxes(end, world.boxes)
 
 
-def free_to(scan, noise=0.0):
-    """[n] distance up to which each beam was free for certain [m]; 0 where it was lost."""
-    reached = np.minimum(np.where(scan.lost, 0.0, scan.ranges), scan.range_max)
-    return np.maximum(reached - noise, 0.0)
-
-
-def nearest_hidden(scan, bearing, radius, noise=0.0):
-    """[N] least range at which a disc's centre contradicts no beam [m].
-
-    Args:
-        scan: exact, or within `noise` of the truth.
-        bearing: [N] of the centre in the world [rad].
-        radius: [N] of the disc [m].
-    """
-    r = free_to(scan, noise)
-    delta = bearing[:, None] - scan.bearings[None]
-    c, s = np.cos(delta), np.abs(np.sin(delta))
-    rho = radius[:, None]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        tangent = rho / s
-        # the disc passes beside the beam, or beyond its end
-        beside = np.where(tangent * c <= r, tangent, 0.0)
-        under = rho**2 - (r * s) ** 2
-        beyond = np.where(under > 0, r * c + np.sqrt(np.maximum(under, 0)), 0.0)
-    end = np.where(c > 0, np.maximum(np.where(np.isfinite(beside), beside, 0.0), beyond), 0.0)
-    return np.maximum(end.max(axis=1), radius)
-
-
-def consistent(scan, centres, radius, noise=0.0):
-    """[N] bool: discs that change no beam of the scan."""
-    w = centres - np.array(scan.pose[:2])
-    bearing = np.arctan2(w[:, 1], w[:, 0])
-    return np.linalg.norm(w, axis=1) >= nearest_hidden(scan, bearing, radius, noise) - 1e-12
-
-
-def hidden_discs(scans, world, body, settings, count, generator):
-    """Discs that may be where no beam saw them: (centres [A, 2], radii [A]).
-
-    Most of them are the nearest that their bearing allows; the others are tucked behind.
-
-    Args:
-        body: [D, 3] x, y, radius of the robot's discs at the scan.
-    """
-    each = count // len(scans) + 1
-    centres, radii = [], []
-    for scan in scans:
-        radius = (
-            0.5
-            * settings.object_width
-            * np.where(generator.random(each) < 0.7, 1.0, 1 + 3 * generator.random(each))
-        )
-        bearing = generator.uniform(-np.pi, np.pi, each)
-        between = generator.random(each) < 0.5
-        steps = generator.integers(0, len(scan.ranges), each) + 0.5
-        bearing[between] = scan.bearings[0] + scan.angle_increment * steps[between]
-        s = nearest_hidden(scan, bearing, radius, settings.range_noise) + 1e-9
-        s = s + np.where(generator.random(each) < 0.7, 0.0, generator.exponential(1.0, each))
-        direction = np.stack([np.cos(bearing), np.sin(bearing)], axis=1)
-        at = np.array(scan.pose[:2]) + s[:, None] * direction
-        # out of the wall that its bearing ends at, to the far side
-        for _ in range(6):
-            stuck = box_distance(at, world) < radius
-            at[stuck] += direction[stuck] * 0.5 * radius[stuck, None]
-        centres.append(at)
-        radii.append(radius)
-    c, rho = np.concatenate(centres), np.concatenate(radii)
-    return keep_possible(scans, world, body, settings, c, rho)
-
-
-def keep_possible(scans, world, body, settings, c, rho):
-    """Those discs that contradict no beam and overlap neither a box nor the robot."""
-    ok = box_distance(c, world) >= rho
-    for x, y, r in body:
-        ok &= np.hypot(c[:, 0] - x, c[:, 1] - y) >= rho + r
-    c, rho = c[ok], rho[ok]
-    for scan in scans:
-        ok = consistent(scan, c, rho, settings.range_noise)
-        c, rho = c[ok], rho[ok]
-    return c, rho
-
-
 # motion ---------------------------------------------------------------------------------------
 
 
@@ -305,23 +224,44 @@ def disc_centres(robot, poses):
     return np.stack([x, y], axis=-1)
 
 
-# attacks --------------------------------------------------------------------------------------
+def midpoint_path(robot, states, control, time_step):
+    """[N, L, 5] states while braking, by the midpoint rule, until all are at rest."""
+    longest = float(rest_time(robot, states, control).max(initial=0.0))
+    count = int(np.ceil(longest / time_step - 1e-6))
+    t = 0.5 * time_step * np.arange(2 * count + 1)
+    a, b = inputs_while_braking(robot, states, control, t)
+    mean_a = 0.5 * (a[:, 0:-1:2] + a[:, 2::2])
+    if robot.kind == CAR:
+        way = mean_a * time_step
+        turn = way * np.tan(b[:, 1::2]) / robot.wheelbase
+    else:
+        mean_b = 0.5 * (b[:, 0:-1:2] + b[:, 2::2])
+        way = 0.5 * (mean_a + mean_b) * time_step
+        turn = (mean_a - mean_b) * time_step / robot.track
+    path = np.empty((len(states), count + 1, 5))
+    path[:, :, 2] = states[:, 2:3] + np.pad(np.cumsum(turn, axis=1), ((0, 0), (1, 0)))
+    middle = path[:, :-1, 2] + 0.5 * turn
+    for column, direction in ((0, np.cos(middle)), (1, np.sin(middle))):
+        gone = np.cumsum(way * direction, axis=1)
+        path[:, :, column] = states[:, column, None] + np.pad(gone, ((0, 0), (1, 0)))
+    path[:, :, 3], path[:, :, 4] = a[:, ::2], b[:, ::2]
+    return path
 
 
-def reaches(points, elapsed, attackers, radius, bound, world):
-    """[N] bool: an attacker can touch a disc at `points` [N, 2], `elapsed` [N] s after the scan.
-
-    Straight ways only: an attacker whose way a box blocks does not count.
-    """
-    c, rho = attackers
-    if not len(c) or not len(points):
-        return np.zeros(len(points), dtype=bool)
-    apart = np.linalg.norm(points[:, None] - c[None], axis=-1)
-    n, k = np.nonzero(apart - rho - radius <= bound * elapsed[:, None])
-    gap = np.maximum(apart[n, k], 1e-12)
-    share = np.clip((gap - rho[k] - radius) / gap, 0, 1)
-    end = c[k] + share[:, None] * (points[n] - c[k])
-    free = ~sweep_blocked(c[k], end, rho[k], world)
-    result = np.zeros(len(points), dtype=bool)
-    result[n[free]] = True
-    return result
+def room(scan, points):
+    """[N] distance from each point to the nearest that the scan did not see to be empty [m];
+    0 where the point itself was not."""
+    r = np.minimum(np.where(scan.lost, 0.0, scan.ranges), scan.range_max)
+    r = np.minimum(r, np.roll(r, -1))  # between two beams: up to the nearer return
+    first, step = scan.bearings[0], scan.angle_increment
+    low = first + step * np.arange(len(r))
+    corners = []
+    for bearing in (low, low + 0.5 * step, low + step):
+        corners.append(np.stack([r * np.cos(bearing), r * np.sin(bearing)], axis=1))
+    border = np.stack(corners, axis=1).reshape(-1, 2) + np.array(scan.pose[:2])
+    edges = np.stack([border, np.roll(border, -1, axis=0)], axis=1)
+    edges = edges[np.linalg.norm(edges[:, 1] - edges[:, 0], axis=1) > 1e-9]
+    distance = point_to_edges(points, edges).min(axis=1)
+    w = points - np.array(scan.pose[:2])
+    wedge = ((np.arctan2(w[:, 1], w[:, 0]) - first) % (2 * np.pi) / step).astype(int) % len(r)
+    return np.where(np.linalg.norm(w, axis=1) < r[wedge], distance, 0.0)
