@@ -10,20 +10,23 @@ from dataclasses import replace
 import numpy as np
 
 from passpmp_ti import backend, door
-from passpmp_ti.grid.body import to_poses, to_states
 from passpmp_ti.grid.model import FutureModel
 from passpmp_ti.grid.static_map import StaticMap
+from passpmp_ti.planner.coast import decision_time
 from passpmp_ti.planner.guide import Guide, GuideField
+from passpmp_ti.planner.intake import Heard, Intake, scans_in
 from passpmp_ti.planner.objective import leaf_costs, trajectory_cost
+from passpmp_ti.planner.place import allowed_gap, carried_on, gap, stitched
 from passpmp_ti.planner.plan import (
-    braking_from,
-    longest_clear_braking,
+    brake_at_once,
+    braking_off,
     still_clear,
     trajectory_to,
 )
 from passpmp_ti.planner.record import CycleRecord
 from passpmp_ti.planner.swarm import Swarm, best_leaf
-from passpmp_ti.planner.tree import ROOT, Tree, TreeGrower, follow
+from passpmp_ti.planner.tree import ROOT, Tree, TreeGrower
+from passpmp_ti.planner.vanished import surfaces, vanished
 from passpmp_ti.robots import Robot
 from passpmp_ti.scan import Scan
 from passpmp_ti.settings import Settings
@@ -33,11 +36,11 @@ TIE, TIE_SHARE = 1e-5, 3e-6
 """A new plan must cost less than the held one by more than this, and by more than this share, which
 is what f32 sums can tell: the held one wins ties. Small against the least progress worth having,
 since a cost to go of a minute is no reason to stand."""
-COAST = 4.0
-"""How far ahead the decision time looks [s]."""
-COAST_PACE = 0.1
-POSE_SLACK = 1e-3
-"""[m] beyond the declared errors at which a robot is no longer where its plan has it."""
+LONGEST_MEMORY = 60.0
+"""[s] What is older is forgotten: ticks end at 65.5 s, and an age that overflows would promise."""
+LONGEST_DOUBT = 5.0
+"""[s] for which scans are not believed that say that surfaces are gone."""
+BELIEVED_AT_LAST = "surfaces were gone for long"
 
 
 class Navigator:
@@ -74,6 +77,11 @@ class Navigator:
         self.model: FutureModel | None = None
         """The last model of the future; the memory of the next one."""
         self.record = CycleRecord(stamp=-math.inf, decision="held", reason="no cycle yet")
+        self._intake = Intake(robot, settings)
+        self._road: Trajectory  # what is held, and what was followed until it begins
+        self._heard_at = -math.inf  # stamp of the last model
+        self._modelled = False  # whether there ever was a model
+        self._disbelieved: float | None = None  # stamp since which scans are not believed
         self._generator = np.random.default_rng(seed)
         self._grower = TreeGrower(robot, settings)
         self._swarm = Swarm(settings) if settings.optimizer == "pso" else None
@@ -90,148 +98,235 @@ class Navigator:
         """Whether the robot came to rest at the last goal."""
         return self._next_goal >= len(self.goals)
 
-    def update(self, scan: Scan | Sequence[Scan], state: np.ndarray) -> Trajectory:
+    def update(
+        self,
+        scan: Scan | Sequence[Scan],
+        state: np.ndarray,
+        *,
+        following: Trajectory | None = None,
+    ) -> Trajectory:
         """Plan one cycle.
 
         Args:
             scan: what the sensors saw at t_k, one scan or several of one instant.
             state: [5] the robot's state then.
+            following: what the robot really follows, where that is not the last answer: an
+                answer that comes after its own start must not be taken, since the robot is not
+                there any more. None: the last answer was taken.
 
         Returns:
             What to execute from t_{k+1} = t_k + cycle on. It ends at rest. Until then the robot
             goes on with what was held before.
 
         Raises:
-            ValueError: in the first cycle, a robot that is not at rest or a state that is none.
-                Later cycles raise nothing because of the world: a scan that cannot be used is an
-                unseen world, and the robot goes on to rest on what it holds.
+            ValueError: in the first cycle, no scan, a robot that is not at rest, or a state that
+                is none. Later cycles raise nothing, whatever comes in and whatever breaks inside:
+                what cannot be used is an unseen world, a planner that raises has found no plan
+                (`record.fault`), and the robot goes on to rest on what it holds.
         """
         began = time.perf_counter()
-        scans = [scan] if isinstance(scan, Scan) else list(scan)
-        if not scans:
-            return self._without_scan(state)
-        stamp = scans[0].stamp
         if self.held is None:
-            self._start(state, stamp)
-        assert self.held is not None
-        trouble = self._trouble(scans, state)
-        if trouble:
-            self.record = CycleRecord(
-                stamp=stamp, decision="held", reason=trouble, lost_scan=trouble, goal=self.goal,
-                plan_time=self.held.duration, chosen=self.held,
-                timings={"total": time.perf_counter() - began},
-            )  # fmt: skip
-            return self.held
-        state = np.asarray(state, dtype=np.float64)
-        self.model = FutureModel.from_scan(
-            scans, self.robot, self.settings, self.model, self.static_map,
-            position=(float(state[0]), float(state[1]), float(state[2])),
-        )  # fmt: skip
-        modelled = time.perf_counter()
-        record = self._decide(self.model, state, stamp, began)
-        timings = {"model": modelled - began, **record.timings}
-        timings["total"] = time.perf_counter() - began
+            self.held = self._road = self._start(scan, state)
+        try:
+            record = self._cycle(scan, state, following, began)
+        except Exception as error:  # whatever it is: what is held ends at rest without a planner
+            self._guide = None
+            record = self._holding(math.nan, _told(error), fault=_told(error))
+        timings = {**record.timings, "total": time.perf_counter() - began}
         self.record = replace(record, timings=timings)
         return self.held
 
-    def _without_scan(self, state: np.ndarray) -> Trajectory:
-        """Nothing was sensed at all: the robot goes on with what it holds."""
-        if self.held is None:
+    def _start(self, scan: object, state: object) -> Trajectory:
+        """Standing where the first cycle finds the robot."""
+        scans, trouble = scans_in(scan)
+        if trouble and not (scans and math.isfinite(scans[0].stamp)):
             raise ValueError(
-                "Navigator.update: the first cycle needs a scan; without one there is no time to"
-                f" start from; the robot is at {np.asarray(state)!r}"
+                f"Navigator.update: {trouble}; the first cycle needs a scan, without one there is"
+                f" no time to start from; the robot is at {state!r}"
             )
-        trouble = "no scan at all"
-        self.record = CycleRecord(
-            stamp=self.record.stamp, decision="held", reason=trouble, lost_scan=trouble,
-            goal=self.goal, plan_time=self.held.duration, chosen=self.held,
-        )  # fmt: skip
-        return self.held
-
-    def _start(self, state: np.ndarray, stamp: float) -> None:
         given = self.robot.check_states("Navigator.update", np.asarray(state)[None])[0]
         if not self.robot.at_rest(given):
             raise ValueError(
                 "Navigator.update: the first cycle needs a robot at rest, nothing is planned yet"
                 f" that could stop it; got {given!r}"
             )
-        self.held = Trajectory.resting(given, stamp)
+        return Trajectory.resting(given, scans[0].stamp)
 
-    def _trouble(self, scans: list[Scan], state: np.ndarray) -> str:
-        """Why this cycle cannot be planned; empty where it can."""
-        stamp = scans[0].stamp
-        if self.model is not None and stamp <= self.model.stamp:
-            return f"scan of {stamp:.3f} s is not newer than the one of {self.model.stamp:.3f} s"
-        if any(abs(s.stamp - stamp) > 1e-6 for s in scans):
-            return "scans of different instants"
-        given = np.asarray(state, dtype=np.float64)
-        if given.shape != (5,) or not np.isfinite(given).all():
-            return "the robot's state is not known"
+    def _cycle(
+        self, scan: object, state: object, following: Trajectory | None, began: float
+    ) -> CycleRecord:
+        """Hear, model, judge, plan. What is kept is replaced whole, or not at all."""
+        assert self.held is not None
+        not_taken = following is not None and following is not self.held
+        if not_taken:
+            if not isinstance(following, Trajectory):
+                raise TypeError(f"following is no Trajectory but {type(following).__name__}")
+            self.held = self._road = following
+        heard = self._intake.hear(scan, state, self._road)
+        if heard.trouble:
+            return self._holding(heard.stamp, heard.trouble, lost=True, not_taken=not_taken)
+        assert heard.state is not None
+        stamp, forgot = heard.stamp, heard.anew
+        if forgot:
+            still = Trajectory.resting(self.robot.within_limits(heard.state), stamp)
+            self._hold(still, anew=True)
+        deviation, turn = gap(self._road, heard.state, stamp)
+        allowed = allowed_gap(self.robot, self.settings)
+        lost = deviation > allowed[0] or turn > allowed[1]
+        if lost:
+            forgot = "off its plan"
+        if self.model is not None and not forgot and stamp - self.model.stamp > LONGEST_MEMORY:
+            forgot = "too long ago"
+        if forgot:
+            # where memory was, or when, is not known any more
+            self.model = self._guide = None
+        model = self._model(heard, lost)
+        modelled = time.perf_counter()
+        if self.model is not None and not len(model.broken_premises):
+            doubt = self._disbelief(self.model, model)
+            if doubt == BELIEVED_AT_LAST:
+                self.model = self._guide = None
+                model, forgot = self._model(heard, lost), doubt
+            elif doubt:
+                return self._holding(stamp, doubt, lost=True, not_taken=not_taken)
+        start = stamp + self.settings.cycle
+        root = self._road.at(start)
+        record = CycleRecord(
+            stamp=stamp, decision="held", goal=self.goal, deviation=deviation,
+            turn_deviation=turn, not_taken=not_taken, forgot=forgot if self._modelled else "",
+            root_proved=int(model.proving_brakes(root[None], np.array([start]))[0]) >= 0,
+            held_clear=lost or still_clear(model, self.held, start),
+            broken_premises=model.broken_premises, model=model,
+        )  # fmt: skip
+        alarm = self._alarm(record, lost, allowed)
+        if alarm:
+            self._brake(model, heard, start, lost)
+            record = replace(
+                record, decision="brake", reason=alarm, chosen=self.held,
+                plan_time=max(self.held.end - start, 0.0), decision_time=0.0,
+            )  # fmt: skip
+        self.model, self._modelled, self._disbelieved = model, True, None
+        self._heard_at = stamp
+        self._intake.used(heard)
+        if not alarm:
+            try:
+                record = self._plan(record, model, heard.state, root, start, began)
+            except Exception as error:  # as above; the model is whole, and memory keeps it
+                self._guide = None
+                record = replace(
+                    record, reason=_told(error), fault=_told(error), chosen=self.held,
+                    plan_time=max(self.held.end - start, 0.0),
+                )  # fmt: skip
+        return replace(record, timings={"model": modelled - began, **record.timings})
+
+    def _model(self, heard: Heard, lost: bool) -> FutureModel:
+        """W(t_k). A disc is declared clear about the start only, and a map's coordinates mean
+        nothing while the robot is not where it should be."""
+        assert heard.state is not None
+        x, y, theta = (float(v) for v in heard.state[:3])
+        settings = self.settings.changed(clear_radius=0.0) if self._modelled else self.settings
+        return FutureModel.from_scan(
+            heard.scans, self.robot, settings, self.model, None if lost else self.static_map,
+            position=(x, y, theta),
+        )  # fmt: skip
+
+    def _disbelief(self, before: FutureModel, model: FutureModel) -> str:
+        """Why the scans are not believed; empty where they are.
+
+        Once doubted, they are believed again when they see about as much as before, or after
+        `LONGEST_DOUBT` seconds, when the robot is long at rest.
+        """
+        doubt = vanished(before, model)
+        if self._disbelieved is None:
+            if doubt:
+                self._disbelieved = model.stamp
+            return doubt
+        if not doubt and 2 * surfaces(model) >= surfaces(before):
+            return ""
+        assert self.held is not None
+        waited = model.stamp - self._disbelieved
+        if waited >= LONGEST_DOUBT and model.stamp >= self.held.end:
+            return BELIEVED_AT_LAST
+        return doubt or "fewer surfaces than before they were gone"
+
+    def _alarm(self, record: CycleRecord, lost: bool, allowed: tuple[float, float]) -> str:
+        """Why the robot has to brake at once; empty where it need not."""
+        if lost and record.deviation > allowed[0]:
+            return f"{record.deviation:.2f} m off its plan"
+        if lost:
+            return f"turned {record.turn_deviation:.2f} rad off its plan"
+        if len(record.broken_premises):
+            return f"{len(record.broken_premises)} returns where nothing could be"
+        if not record.held_clear:
+            return "what is held is not clear any more"
         return ""
 
-    def _decide(
-        self, model: FutureModel, state: np.ndarray, stamp: float, began: float
+    def _holding(
+        self,
+        stamp: float,
+        reason: str,
+        *,
+        lost: bool = False,
+        fault: str = "",
+        not_taken: bool = False,
+    ) -> CycleRecord:
+        """The record of a cycle that goes on with what is held."""
+        assert self.held is not None
+        return CycleRecord(
+            stamp=self.record.stamp if math.isnan(stamp) else stamp, decision="held",
+            reason=reason, lost_scan=reason if lost else "", fault=fault, not_taken=not_taken,
+            goal=self.goal, plan_time=self.held.duration, chosen=self.held,
+        )  # fmt: skip
+
+    def _plan(
+        self,
+        record: CycleRecord,
+        model: FutureModel,
+        state: np.ndarray,
+        root: np.ndarray,
+        start: float,
+        began: float,
     ) -> CycleRecord:
         """Choose what to hold from t_{k+1} on; `began`: wall clock at the cycle's start."""
         assert self.held is not None
         settings = self.settings
         timings: dict[str, float] = {}
         clock = _Clock(timings)
-        start = stamp + settings.cycle
-        deviation = float(np.hypot(*(state[:2] - self.held.at(stamp)[:2])))
-        root = self.held.at(start)
-        root_brake = int(model.proving_brakes(root[None], np.array([start]))[0])
-        common = CycleRecord(
-            stamp=stamp, decision="held", goal=self.goal, deviation=deviation,
-            root_proved=root_brake >= 0, held_clear=still_clear(model, self.held, start),
-            broken_premises=model.broken_premises, model=model,
-        )  # fmt: skip
-        allowed = settings.tracking_error + settings.localisation_error + POSE_SLACK
-        lost = deviation > allowed
-        if len(model.broken_premises) or lost:
-            self._brake(model, state if lost else root, start)
-            reason = (
-                f"{deviation:.2f} m off its plan"
-                if lost
-                else f"{len(model.broken_premises)} returns where nothing could be"
-            )
-            return replace(
-                common, decision="brake", reason=reason, chosen=self.held, timings=timings,
-                plan_time=self.held.duration, decision_time=0.0,
-            )  # fmt: skip
         if self._arrive(state, root, start):
             clock.lap("bookkeeping")
-            return replace(common, decision="arrived", chosen=self.held, timings=timings)
+            return replace(record, decision="arrived", chosen=self.held, timings=timings)
 
         guide = self._guide_field(model, state)
         clock.lap("guide")
-        tree = self._grower.grow(model, guide, root, start, root_brake)
+        proof = int(model.proving_brakes(root[None], np.array([start]))[0])
+        tree = self._grower.grow(model, guide, root, start, proof)
         clock.lap("tree")
         leaf, particles, cost_new = self._choose(tree)
         cost_held = trajectory_cost(self.held, start, guide, settings, self.robot)
         clock.lap("choice")
-        decision, reason = "held", "no safe plan was found"
+        plan, reason = None, "no safe plan was found"
         if leaf != ROOT:
-            decision, reason = "held", "the held plan is at least as good"
+            reason = "the held plan is at least as good"
             if cost_new < cost_held - max(TIE, TIE_SHARE * cost_held):
                 plan = trajectory_to(tree, leaf)
                 late = settings.deadline is not None and (
                     time.perf_counter() - began > settings.deadline
                 )
                 if late:
-                    reason = "planning took longer than the deadline"
-                elif still_clear(model, plan):
-                    self.held, decision, reason = plan, "new", ""
-                else:
-                    reason = "the new plan did not stand its second check"
-        decision_time = self._decision_time(model, self.held, stamp, start)
+                    plan, reason = None, "planning took longer than the deadline"
+                elif not still_clear(model, plan):
+                    plan, reason = None, "the new plan did not stand its second check"
+        chosen = self.held if plan is None else plan
+        delay = decision_time(model, chosen, record.stamp, start)
         clock.lap("bookkeeping")
+        if plan is not None:
+            self._hold(plan)
         return replace(
-            common, decision=decision, reason=reason, timings=timings, tree=tree,
-            tree_nodes=tree.count, tree_depth=tree.depth, tree_stopped_by=tree.stopped_by,
-            cost=cost_new if decision == "new" else cost_held, cost_new=cost_new,
-            cost_held=cost_held, plan_time=max(self.held.end - start, 0.0),
-            decision_time=decision_time, particle_leaves=particles, chosen=self.held,
+            record, decision="held" if plan is None else "new", reason="" if plan is not None else reason,
+            timings=timings, tree=tree, tree_nodes=tree.count, tree_depth=tree.depth,
+            tree_stopped_by=tree.stopped_by, cost=cost_held if plan is None else cost_new,
+            cost_new=cost_new, cost_held=cost_held, plan_time=max(chosen.end - start, 0.0),
+            decision_time=delay, particle_leaves=particles, chosen=chosen,
         )  # fmt: skip
 
     def _arrive(self, state: np.ndarray, root: np.ndarray, start: float) -> bool:
@@ -242,18 +337,34 @@ class Navigator:
         if self._next_goal < len(self.goals):
             self._next_goal += 1
         if self.reached:
-            self.held = Trajectory.resting(root, start)
+            self._hold(Trajectory.resting(root, start))
         return self.reached
 
-    def _brake(self, model: FutureModel, root: np.ndarray, start: float) -> None:
-        """Hold braking at once: by a proven control, or by the one that stays clear longest."""
-        root = self.robot.within_limits(root)
-        proof = int(model.proving_brakes(root[None], np.array([start]))[0])
-        self.held = (
-            braking_from(model, root, start, proof)
-            if proof >= 0
-            else longest_clear_braking(model, root, start)
+    def _brake(self, model: FutureModel, heard: Heard, start: float, lost: bool) -> None:
+        """Hold braking at once.
+
+        Off the plan, it brakes from where the robot will be at t_{k+1} if it goes on as it does
+        (`carried_on`). Where no braking is proven there, and it is farther off than it can have
+        gone, its pose or its clock jumped and not the robot: its motion is still the one that was
+        verified, and the rest of that is laid where the robot is told to be.
+        """
+        assert heard.state is not None
+        if not lost:
+            self._hold(braking_off(model, self._road, start))
+            return
+        allowed = allowed_gap(self.robot, self.settings)
+        root, rest = carried_on(
+            model, self._road, heard.state, heard.stamp, allowed, self._heard_at
         )
+        if rest is not None and model.proving_brakes(root[None], np.array([start])) < 0:
+            self._hold(rest, anew=True)
+        else:
+            self._hold(brake_at_once(model, root, start), anew=True)
+
+    def _hold(self, trajectory: Trajectory, *, anew: bool = False) -> None:
+        """Hold it from its start on; `anew`: it has nothing to do with what was followed."""
+        self._road = trajectory if anew else stitched(self._road, trajectory)
+        self.held = trajectory
 
     def _guide_field(self, model: FutureModel, state: np.ndarray) -> GuideField:
         if self._guide is None:
@@ -274,33 +385,10 @@ class Navigator:
         leaf, particles = self._swarm.choose(tree, costs, self._generator)
         return leaf, particles, float(costs[leaf])
 
-    def _decision_time(
-        self, model: FutureModel, held: Trajectory, stamp: float, start: float
-    ) -> float:
-        """delta_d of eq. 20: until the held motion, kept on without braking, is first ICS^b."""
-        turn = float(held.times[held.brakes_from])
-        ahead = np.arange(start, turn, COAST_PACE)
-        states = held.sampled(ahead) if len(ahead) else np.zeros((0, 5))
-        last = held.at(max(turn, start))
-        if bool(self.robot.at_rest(last)):
-            times = ahead
-        else:
-            pace = self.settings.steps_of(COAST_PACE)
-            steps = max(pace, 1) * round(COAST / COAST_PACE)
-            coasting = follow(
-                model,
-                to_poses(last[None], model.window.anchor)[0],
-                [(np.zeros(3, dtype=np.float32), steps)],
-            )[:: max(pace, 1)]
-            coast_times = max(turn, start) + self.settings.time_step * max(pace, 1) * np.arange(
-                len(coasting)
-            )
-            states = np.concatenate([states, to_states(coasting, model.window.anchor)])
-            times = np.concatenate([ahead, coast_times])
-        if not len(times):
-            return math.inf
-        unsafe = ~model.passively_safe(states, times)
-        return float(times[np.argmax(unsafe)] - stamp) if unsafe.any() else math.inf
+
+def _told(error: Exception) -> str:
+    """An error in one line."""
+    return f"{type(error).__name__}: {error}".splitlines()[0][:300]
 
 
 class _Clock:

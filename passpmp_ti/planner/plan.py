@@ -25,16 +25,57 @@ def braking_from(model: FutureModel, state: np.ndarray, start: float, control: i
     return _as_trajectory(model, pose, [(model.body.braking[control], -1)], start, 0)
 
 
-def longest_clear_braking(model: FutureModel, state: np.ndarray, start: float) -> Trajectory:
-    """The braking that stays clear longest: what is left when none is proven."""
-    candidates = [
-        braking_from(model, state, start, control) for control in range(len(model.body.braking))
-    ]
+def brake_at_once(model: FutureModel, state: np.ndarray, start: float) -> Trajectory:
+    """Braking from `state` [5] at `start` [s] by a proven control; where none is, by the one that
+    stays clear longest: all that is left then."""
+    state = model.robot.within_limits(state)
+    proof = int(model.proving_brakes(state[None], np.array([start]))[0])
+    if proof >= 0:
+        return braking_from(model, state, start, proof)
+    brakes = [braking_from(model, state, start, k) for k in range(len(model.body.braking))]
+    touches = [touched(model, brake) for brake in brakes]
     clear_until = [
-        float(c.times[np.argmax(taken)]) if (taken := touched(model, c)).any() else np.inf
-        for c in candidates
+        float(brake.times[np.argmax(taken)]) if taken.any() else np.inf
+        for brake, taken in zip(brakes, touches, strict=True)
     ]
-    return candidates[int(np.argmax(clear_until))]
+    return brakes[int(np.argmax(clear_until))]
+
+
+def braking_off(model: FutureModel, road: Trajectory, start: float) -> Trajectory:
+    """Leave what is followed by braking: at `start` [s] if that is proven, else as soon as it is.
+
+    In the middle of a primitive no braking need be proven, while the road itself is: then it is
+    followed up to the first sample from which one is. Where the model finds it free, there always
+    is one, its own tail at the latest. Where it does not, and braking is proven nowhere on the free
+    part of it, the robot brakes at once.
+    """
+    root = model.robot.within_limits(road.at(start))
+    proof = int(model.proving_brakes(root[None], np.array([start]))[0])
+    if proof >= 0:
+        return braking_from(model, root, start, proof)
+    later = np.flatnonzero(road.times > start + 1e-9)
+    proofs = model.proving_brakes(road.states[later], road.times[later])
+    good = np.flatnonzero(proofs >= 0)
+    touches = _touched_since(model, road, start)
+    if len(good) and not touches[: later[good[0]]].any():
+        turn, begin = int(later[good[0]]), int(later[0])
+        tail = braking_from(model, road.states[turn], float(road.times[turn]), int(proofs[good[0]]))
+        return Trajectory(
+            np.concatenate([[start], road.times[begin:turn], tail.times]),
+            np.concatenate([[road.at(start)], road.states[begin:turn], tail.states]),
+            1 + turn - begin,
+        )
+    return brake_at_once(model, root, start)
+
+
+def _touched_since(model: FutureModel, trajectory: Trajectory, since: float) -> np.ndarray:
+    """[m] bool: `touched`, where steps that end before `since` [s] are not asked about."""
+    first = int((np.append(trajectory.times[1:], np.inf) <= since + 1e-9).sum())
+    result = np.zeros(len(trajectory.times), dtype=bool)
+    # the last state may be minutes old, more than ticks can tell; nothing is asked after it
+    times = np.maximum(trajectory.times[first:], model.stamp - 1.0)
+    result[first:] = model.touched(trajectory.states[first:], times)
+    return result
 
 
 def still_clear(model: FutureModel, trajectory: Trajectory, since: float = -np.inf) -> bool:
@@ -42,8 +83,7 @@ def still_clear(model: FutureModel, trajectory: Trajectory, since: float = -np.i
 
     A second opinion on the whole path, not a new proof at other times.
     """
-    ends = np.append(trajectory.times[1:], np.inf)
-    return not touched(model, trajectory)[ends > since + 1e-9].any()
+    return not _touched_since(model, trajectory, since).any()
 
 
 def touched(model: FutureModel, trajectory: Trajectory) -> np.ndarray:

@@ -21,7 +21,7 @@ class CycleRecord:
     """t_k [s]."""
     decision: str
     """"new": a plan of this cycle's tree; "held": the remainder of the plan held; "brake": braking
-    at once, after a broken premise; "arrived": at rest at the last goal."""
+    at once, after a broken premise or off its plan; "arrived": at rest at the last goal."""
     reason: str = ""
     """Why the plan is not a new one; empty where it is."""
     timings: dict[str, float] = field(default_factory=dict)
@@ -45,13 +45,23 @@ class CycleRecord:
     primitive none needs to: what is held ends at rest another way, see `held_clear`."""
     held_clear: bool = True
     """Whether what was held, judged by this cycle's model at its own sample times, is still free
-    to its end: the certificate. Only a broken premise may make it False."""
+    to its end: the certificate. Only a broken premise may make it False. True where it was not
+    asked: without a scan, or off the plan, where memory's coordinates mean nothing."""
     broken_premises: np.ndarray = field(default_factory=lambda: np.zeros((0, 2)))
     """[n, 2] places [m] where a return stood in space proven free."""
     lost_scan: str = ""
     """Why the scan was not used; empty where it was."""
+    fault: str = ""
+    """What the planner itself raised in this cycle, type and message; empty where nothing was."""
+    not_taken: bool = False
+    """The executor told that it follows something else than the last answer."""
+    forgot: str = ""
+    """Why this cycle's model knows nothing of the ones before; empty where it does, and in the
+    first cycle."""
     deviation: float = 0.0
     """Distance between the robot and its plan at t_k [m]."""
+    turn_deviation: float = 0.0
+    """Angle between the robot's heading and its plan's at t_k [rad]."""
     goal: tuple[float, float] = (0.0, 0.0)
     """The goal that this cycle drove to [m]."""
 

@@ -1,0 +1,69 @@
+"""What was seen cannot be gone: a scan that says so is not to be believed."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from passpmp_ti.grid.model import FutureModel
+
+FEWEST, LEAST_SHARE = 3, 0.05
+"""Surfaces that must be gone before the scan is doubted, and their share of those asked about: a
+single one may have been a raindrop."""
+MOST_REACH = 200
+"""[cells] Who may have gone farther than this is not asked about."""
+
+
+def surfaces(model: FutureModel) -> int:
+    """How many cells hold a surface."""
+    return int(np.count_nonzero(model.static) + np.count_nonzero(model.movable))
+
+
+def vanished(before: FutureModel, now: FutureModel) -> str:
+    """Why the scans of `now` cannot be true after those of `before`; empty where they can.
+
+    Whoever was met at a place is still within reach of it, and a surface that stays is still
+    there. So not all of the square about it, as wide as it may have moved, can be proven empty.
+    Where it is, a beam passed through something: a sensor that sees nothing any more and says
+    "nothing there".
+    """
+    settings = now.settings
+    age = now.stamp - before.stamp + settings.stamp_error
+    # both scans may be off, and a surface is known to a cell only
+    margin = 2 * (settings.range_noise + settings.localisation_error) + 2 * now.cell
+    asked = gone = 0
+    shift = np.array(before.window.corner) - np.array(now.window.corner)
+    sums: np.ndarray | None = None
+    for mask, speed in ((before.static, 0.0), (before.movable, settings.object_speed)):
+        reach = math.ceil((speed * age + margin) / now.cell)
+        if reach > MOST_REACH:
+            continue
+        j, i = np.divmod(np.flatnonzero(mask), mask.shape[1])
+        i, j = i + shift[0], j + shift[1]
+        size = now.window.size
+        inside = (np.minimum(i, j) >= reach) & (np.maximum(i, j) < size - reach)
+        i, j = i[inside], j[inside]
+        asked += len(i)
+        passed = now.seen[j, i]  # most are not: that is quick to ask
+        i, j = i[passed], j[passed]
+        if not len(i):
+            continue
+        if sums is None:
+            sums = _sums(now.seen)
+        low_i, high_i, low_j, high_j = i - reach, i + reach + 1, j - reach, j + reach + 1
+        empty = (
+            sums[high_j, high_i] - sums[low_j, high_i] - sums[high_j, low_i] + sums[low_j, low_i]
+        )
+        gone += int((empty == (2 * reach + 1) ** 2).sum())
+    if gone >= FEWEST and gone >= LEAST_SHARE * asked:
+        return f"{gone} of {asked} surfaces are gone that cannot be"
+    return ""
+
+
+def _sums(seen: np.ndarray) -> np.ndarray:
+    """[J + 1, I + 1] how many cells are seen below and left of each corner."""
+    sums = np.zeros((seen.shape[0] + 1, seen.shape[1] + 1), dtype=np.int32)
+    np.cumsum(seen, axis=0, out=sums[1:, 1:])
+    np.cumsum(sums[1:, 1:], axis=1, out=sums[1:, 1:])
+    return sums
