@@ -53,12 +53,16 @@ class Drive:
         """Execute what is held from `begin` to `end` [s], under the judge's eyes."""
         count = max(math.ceil((end - begin) / JUDGE_STEP - 1e-6), 1)
         times = np.linspace(begin, end, count + 1)
-        states = self.executing.sampled(times)
+        self.follow(times, self.executing.sampled(times))
+
+    def follow(self, times: np.ndarray, states: np.ndarray) -> None:
+        """Take note of where the robot truly was: states [n, 5] at times [n] [s]."""
         self.judge.see(times, states)
         rest = self.scenario.robot.at_rest(states)
         self.distance += float(np.hypot(*np.diff(states[:, :2], axis=0).T).sum())
         self.time_moving += float((np.diff(times)[~(rest[:-1] & rest[1:])]).sum())
-        stored = math.ceil((end - begin) / STORE_STEP - 1e-6)
+        count = len(times) - 1
+        stored = math.ceil(float(times[-1] - times[0]) / STORE_STEP - 1e-6)
         kept = np.unique(np.linspace(0, count, max(stored, 1) + 1).round().astype(int))[1:]
         self.times.append(times[kept])
         self.states.append(states[kept])
