@@ -20,7 +20,7 @@ def init(backend: str = "auto", threads: int | None = None, *, debug: bool = Fal
 
     Args:
         backend: "cpu", "cuda", "vulkan", "metal", or "auto": CUDA where it works, else the CPU.
-        threads: most CPU threads; None: all.
+        threads: most CPU threads, OpenCV's among them; None: all.
         debug: check every index in the kernels; slow, for tests.
 
     Returns:
@@ -56,6 +56,11 @@ def init(backend: str = "auto", threads: int | None = None, *, debug: bool = Fal
     )
     if threads is not None:
         options["cpu_max_num_threads"] = threads
+        # OpenCV's own threads would wait busily on cores that others were promised
+        with contextlib.suppress(ImportError):
+            import cv2
+
+            cv2.setNumThreads(threads)
     try:
         with contextlib.redirect_stdout(io.StringIO()):
             ti.init(arch=getattr(ti, wanted), enable_fallback=False, **options)
