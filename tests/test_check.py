@@ -1,4 +1,4 @@
-"""The check of a path against the arrival map: nothing is jumped over, nothing is judged too early."""
+"""The check of a path against arrivals: nothing is jumped over, nothing is judged too early."""
 
 from dataclasses import replace
 

@@ -55,7 +55,7 @@ def test_an_unknown_setting_suggests_the_nearest():
 
 
 def test_times_that_do_not_divide_are_refused_with_the_reason():
-    with pytest.raises(ValueError, match=r"time_step must be a whole number of milliseconds.*2.5 ms"):
+    with pytest.raises(ValueError, match=r"time_step must be a whole number of millisec.*2.5 ms"):
         Settings(time_step=0.0025)
     with pytest.raises(ValueError, match=r"cycle = 0\.11 s must be a whole number of time steps"):
         Settings(cycle=0.11)

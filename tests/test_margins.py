@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from oracle import attack, cases, exact, hidden
 
+import passpmp_ti.grid.arrival as arrival_module
 import passpmp_ti.grid.model as model_module
 from passpmp_ti import DifferentialDrive, FutureModel, Scan, Settings
 from passpmp_ti.grid.distance import distance_to_zeros
@@ -89,7 +90,7 @@ def broken(claim, truth=None, shift=(0.0, 0.0), attackers=0, later=0.0, seeds=3,
 def test_the_extent_of_cells(monkeypatch):
     case = seen(WALLS_ONLY, FINE.changed(cell=0.2))
     assert broken(case) == 0
-    monkeypatch.setattr(model_module, "distance_between_cells", distance_to_zeros)
+    monkeypatch.setattr(arrival_module, "distance_between_cells", distance_to_zeros)
     assert broken(case) > 0
 
 

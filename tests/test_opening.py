@@ -11,6 +11,7 @@ from passpmp_ti import CarLike, FutureModel, Settings
 from passpmp_ti.grid.distance import distance_to_zeros
 from passpmp_ti.kernels.visibility import SOURCES
 
+
 def slot(width=2, length=20):
     """[60, 60]: all is seen but the lower third and a slot that leads into it."""
     seen = np.ones((60, 60), dtype=np.uint8)
@@ -147,7 +148,7 @@ def post_before_a_wall():
     scan = exact.sweep(world, place, 1440, 2 * np.pi, 40.0, 10.0)
     case = cases.Case(CAR, settings, world, [scan], place)
     generator = np.random.default_rng(0)
-    states, times = cases.random_states(case, 3000, generator)
+    states, _ = cases.random_states(case, 3000, generator)
     states[:, 0], states[:, 1] = generator.uniform(3, 9, 3000), generator.uniform(-5, 5, 3000)
     states[:, 3] *= 0.2
     return case, states, 10.0 + 0.2 * generator.random(3000)

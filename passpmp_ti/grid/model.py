@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -10,23 +9,13 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from passpmp_ti import backend, door
+from passpmp_ti.grid.arrival import arrival, rasterised
 from passpmp_ti.grid.body import Body, to_poses
-from passpmp_ti.grid.distance import NO_SEED, distance_between_cells
-from passpmp_ti.grid.memory import (
-    broken_premises,
-    check_previous,
-    remembered_ticks,
-    without_intruders,
-)
-from passpmp_ti.grid.opening import opened_sources
+from passpmp_ti.grid.memory import check_previous
 from passpmp_ti.grid.static_map import StaticMap
 from passpmp_ti.grid.view import Views, views_of
 from passpmp_ti.grid.window import Window, size_for
-from passpmp_ti.kernels.arrival import (
-    NEVER,
-    arrival_times,
-)
-from passpmp_ti.kernels.beams import SLACK
+from passpmp_ti.kernels.arrival import NEVER
 from passpmp_ti.kernels.check import check_path, check_states
 from passpmp_ti.kernels.visibility import (
     BLIND_SOURCES,
@@ -34,8 +23,6 @@ from passpmp_ti.kernels.visibility import (
     SOURCES,
     STANDING_SOURCES,
     STATIC_CELLS,
-    mark_sources,
-    see_cells,
 )
 from passpmp_ti.robots import Robot
 from passpmp_ti.scan import Scan
@@ -133,20 +120,10 @@ class FutureModel:
             reach_of,
             static_map,
         )
-        seen, marks = _rasterise(views, window, settings)
+        seen, marks = rasterised(views, window, settings)
         base = math.floor(stamp / TICK + 1e-6)
         body = Body.of(robot, settings)
-        opened = None
-        # Views whose poses err apart leave less of a disc hidden, by no more than one error; how far
-        # the rest of it reaches is inside the clearance, as the scan's error.
-        radius = settings.object_radius - settings.localisation_error
-        if radius > 0:
-            opened = opened_sources(seen, marks, window.cell, radius)
-        ticks, broken = _arrival(
-            views, seen, marks, opened, window, base, robot, settings, previous
-        )
-        if opened is not None:
-            marks = opened
+        ticks, marks, broken = arrival(views, seen, marks, window, base, robot, settings, previous)
         return cls(
             robot, settings, window, stamp, base, ticks, seen.view(bool), marks, views, broken, body
         )
@@ -352,70 +329,3 @@ def _empty_discs(
         # its border must lie in the window: what comes in over it is marked there
         discs.append((x, y, min(settings.clear_radius, window.inner_radius)))
     return discs
-
-
-def _rasterise(views: Views, window: Window, settings: Settings) -> tuple[np.ndarray, np.ndarray]:
-    seen = np.empty((window.size, window.size), dtype=np.uint8)
-    marks = np.ones((5, window.size, window.size), dtype=np.uint8)
-    i0, j0 = window.corner
-    see_cells(views.view, views.beams, views.reach, i0, j0, window.cell, seen)
-    apart = settings.unseen_speed < settings.object_speed
-    mark_sources(
-        views.view, views.beams, views.ranges, views.met, views.reach, views.far_side,
-        views.scans, int(apart), i0, j0, window.cell, 2 * settings.range_noise + SLACK, marks,
-    )  # fmt: skip
-    return seen, marks
-
-
-@functools.cache
-def _nothing_near(size: int) -> np.ndarray:
-    """[size, size] distances where nothing is marked anywhere; only ever read."""
-    return np.full((size, size), NO_SEED, dtype=np.float32)
-
-
-def _to_sources(marks: np.ndarray, blind_speed: float) -> tuple[np.ndarray, np.ndarray]:
-    """[J, I] distances to the nearest source, and to the nearest blind one [cells]."""
-    to_source = distance_between_cells(marks[SOURCES])
-    if blind_speed > 0 and not marks[BLIND_SOURCES].all():
-        return to_source, distance_between_cells(marks[BLIND_SOURCES])
-    return to_source, _nothing_near(len(to_source))
-
-
-def _arrival(
-    views: Views,
-    seen: np.ndarray,
-    marks: np.ndarray,
-    opened: np.ndarray | None,
-    window: Window,
-    base: int,
-    robot: Robot,
-    settings: Settings,
-    previous: FutureModel | None,
-) -> tuple[np.ndarray, np.ndarray]:
-    """(ticks, broken premises): arrival times, never earlier than memory knows."""
-    blind_speed = settings.unseen_speed
-    to_source, to_blind = _to_sources(marks, blind_speed)
-    if opened is not None:
-        farther, blind_farther = _to_sources(opened, blind_speed)
-        to_source = np.maximum(to_source, farther)
-        to_blind = np.maximum(to_blind, blind_farther)
-    to_unseen = distance_between_cells(seen)
-
-    clearance = settings.clearance(robot)
-    broken = np.zeros((0, 2))
-    memory, shift, age = remembered_ticks(previous), (0, 0), -1
-    if previous is not None:
-        age = base - previous.base_ticks
-        shift = (
-            window.corner[0] - previous.window.corner[0],
-            window.corner[1] - previous.window.corner[1],
-        )
-        broken = broken_premises(previous, views, window, age, robot, settings)
-        if len(broken):
-            memory = without_intruders(previous, broken, age, clearance, settings)
-    ticks = np.empty(seen.shape, dtype=np.uint16)
-    arrival_times(
-        to_source, to_blind, to_unseen, memory, shift[0], shift[1], age, window.cell, clearance,
-        settings.object_speed, blind_speed, settings.stamp_error, ticks,
-    )  # fmt: skip
-    return ticks, broken

@@ -9,9 +9,9 @@ before the nearer of its two returns, unless
 
 A wedge whose far side is one surface that stays (both returns static and no farther apart than
 the narrowest object, or the map knows the wall between them) lets nothing through. All others do.
-Somebody who leans on a mapped wall may have one return that is taken for it. Another beam would meet
-him farther from the wall, unless the wedge is nearly as wide as he is: such a wedge the map does not
-shut.
+Somebody who leans on a mapped wall may have one return that is taken for it. Another beam would
+meet him farther from the wall, unless the wedge is nearly as wide as he is: such a wedge the map
+does not shut.
 
 A view is a polar region: views of scans, and discs that are known to be empty (the robot's own
 body, a declared clearing). Rows of `view` (f32): 0 x, 1 y, 2 bearing of beam 0 in the world,
@@ -57,7 +57,7 @@ def mapped(map_static: ti.template(), frame: ti.template(), x, y):
 @ti.func
 def stays(label):
     """Whether what a beam met is known to stay."""
-    return label == STATIC or label == STATIC_BY_MAP
+    return label >= STATIC
 
 
 @ti.func

@@ -4,8 +4,8 @@ The arrival map holds, for each cell [j, i], the number of milliseconds (ticks) 
 base at which a robot disc centred anywhere in the cell could first be touched; 0: never free.
 
 A time step is looked at as often as it takes, the more the faster the robot: each look speaks for
-a piece of the way, from whose middle no disc's centre is farther than the clearance that the map was
-grown by allows (`settings.motion_margin`), and is judged at the piece's end, when the cones are
+a piece of the way, from whose middle no disc's centre is farther than the clearance allows that the
+map was grown by (`settings.motion_margin`), and is judged at the piece's end, when the cones are
 widest. Both lean to the unsafe side.
 
 Shared parameters:
