@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from oracle import exact
 
+import passpmp_ti.grid.window as window_module
 from passpmp_ti import DifferentialDrive, FutureModel, Settings
 
 ROBOT = DifferentialDrive()
@@ -47,6 +48,23 @@ def test_no_cell_is_touched_earlier_than_the_model_before_said(speed):
         stamp += 0.1003
         pose = pose + generator.uniform(-1, 1, 3) * [0.12, 0.12, 0.3]
         walker = walker + speed * 0.1 * np.array([-0.6, 0.8])
+
+
+def test_a_robot_that_drives_far_keeps_its_memory_and_its_precision(monkeypatch):
+    # as if 200 m were 0.5 m: the anchor moves on, by whole cells
+    monkeypatch.setattr(window_module, "FARTHEST_ANCHOR", 0.5)
+    boxes = [exact.box(1.5, 1.0, 0.8, 0.5, 0.3)]
+    model, anchors = None, set()
+    for k in range(12):
+        after = model_at((0.1003 * k, 0.0, 0.0), 7.0 + 0.1 * k, boxes, (), model)
+        anchors.add(after.window.anchor)
+        assert np.abs(np.array(after.window.anchor) - (0.1003 * k, 0.0)).max() <= 0.55
+        if model is not None:
+            assert len(after.broken_premises) == 0
+            old, new = overlap(model, after)
+            assert (new >= old).all()
+        model = after
+    assert len(anchors) > 2
 
 
 def test_a_shadow_that_was_seen_empty_stays_free_for_a_while():

@@ -170,11 +170,15 @@ def test_objects_smaller_than_declared_break_proofs():
     assert attacked(case, small, states, times)[2] > 0
 
 
-@pytest.mark.parametrize("margin", ["the cell", "the reach"])
-def test_the_extent_of_cells_is_needed_to_find_a_disc_that_just_fits(monkeypatch, margin):
-    if margin == "the cell":
-        monkeypatch.setattr(opening, "CELL_REACH", -0.2)
-    else:
-        monkeypatch.setattr(opening, "distance_between_cells", distance_to_zeros)
+def test_the_extent_of_cells_is_needed_to_find_a_disc_that_just_fits(monkeypatch):
+    monkeypatch.setattr(opening, "distance_between_cells", distance_to_zeros)
+    with pytest.raises(AssertionError):
+        test_a_disc_that_just_fits_is_found_however_the_cells_lie()
+
+
+def test_a_centre_anywhere_in_its_cell_is_needed_too(monkeypatch):
+    # half a cell less: as if only the middle of a cell could hold a centre
+    exact_distance = distance_to_zeros
+    monkeypatch.setattr(opening, "distance_to_zeros", lambda mask: exact_distance(mask) - 0.5)
     with pytest.raises(AssertionError):
         test_a_disc_that_just_fits_is_found_however_the_cells_lie()

@@ -92,10 +92,7 @@ def arrival(
     memory, shift, age = remembered_ticks(previous), (0, 0), -1
     if previous is not None:
         age = base - previous.base_ticks
-        shift = (
-            window.corner[0] - previous.window.corner[0],
-            window.corner[1] - previous.window.corner[1],
-        )
+        shift = previous.window.cells_to(window)
         broken = broken_premises(previous, views, window, age, robot, settings)
         if len(broken):
             memory = without_intruders(previous, broken, age, clearance, settings)

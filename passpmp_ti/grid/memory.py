@@ -85,7 +85,7 @@ def broken_premises(
         return np.zeros((0, 2))
     broken = np.zeros(len(returns), dtype=np.int32)
     contradicted(
-        (returns - np.array(window.anchor)).astype(np.float32), previous.ticks, age,
+        (returns - np.array(previous.window.anchor)).astype(np.float32), previous.ticks, age,
         *previous.window.corner, window.cell, radius, broken,
     )  # fmt: skip
     return returns[broken == 1]

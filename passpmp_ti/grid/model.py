@@ -97,12 +97,8 @@ class FutureModel:
                 f"FutureModel.from_scan: scans of one instant have one stamp; got {stamp} and"
                 f" {apart[0]}; make one model after the other instead, with previous="
             )
-        if static_map is not None and settings.map_tolerance >= 0.5 * settings.object_width:
-            raise ValueError(
-                f"Settings.map_tolerance = {settings.map_tolerance:g} m must be less than half of"
-                f" object_width = {settings.object_width:g} m where there is a static map: a door"
-                " as wide as an object must not be taken for wall"
-            )
+        if static_map is not None:
+            _check_door(settings, static_map.resolution)
         if previous is not None:
             check_previous(previous, robot, settings, stamp)
         if position is None:
@@ -292,6 +288,22 @@ class FutureModel:
                 f" {self.stamp:.6f} s: the model speaks only of what comes after it"
             )
         return self.ticks_of(times)
+
+
+def _check_door(settings: Settings, resolution: float) -> None:
+    """Refuse a map on which a door as wide as an object would be taken for wall.
+
+    Its jambs are grown by the tolerance and reach up to a cell into it; what is left must be as wide
+    as the cell that is sure to be asked.
+    """
+    left = settings.object_width - 2 * settings.map_tolerance - 2 * resolution
+    if left < resolution:
+        raise ValueError(
+            f"Settings.map_tolerance = {settings.map_tolerance:g} m is too much for a static map of"
+            f" {resolution:g} m cells and objects of {settings.object_width:g} m: a door as wide as"
+            " an object must not be taken for wall; it may be"
+            f" {0.5 * (settings.object_width - 3 * resolution):g} m at most, or the map finer"
+        )
 
 
 def _window_for(

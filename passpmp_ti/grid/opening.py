@@ -21,9 +21,6 @@ from passpmp_ti.kernels.beams import SLACK
 from passpmp_ti.kernels.visibility import BLIND_SOURCES, SOURCES, STANDING_SOURCES
 
 ALL_ROUND = np.ones((3, 3), dtype=bool)
-CELL_REACH = (math.sqrt(2) - 1) / 2
-"""From any point of a cell to the nearest point of another, at most this much farther than from
-centre to centre [cells]: half a diagonal more at one end, half a side less at the other."""
 
 
 def opened_sources(seen: np.ndarray, marks: np.ndarray, cell: float, radius: float) -> np.ndarray:
@@ -65,8 +62,9 @@ def opened_region(seen: np.ndarray, cell: float, radius: float) -> np.ndarray:
     """
     pad = math.ceil(radius / cell) + 2
     hidden = np.pad(seen == 0, pad, constant_values=True).astype(np.uint8)
-    # the exact distance is right to 1e-3 cells
-    to_seen = distance_to_zeros(hidden) + (CELL_REACH + 1e-3)
+    # From any point of a cell another cell is no farther than the two centres are: along each axis
+    # the point may be half a side farther, and the cell begins half a side nearer. 1e-3: rounding.
+    to_seen = distance_to_zeros(hidden) + 1e-3
     holds_no_centre = (to_seen * cell + SLACK < radius).astype(np.uint8)
     reach = distance_between_cells(holds_no_centre) - 1e-3
     return (reach * cell <= radius + SLACK)[pad:-pad, pad:-pad]

@@ -114,7 +114,7 @@ def views_of(
             )
         wedges.prove_wedges(
             r, labels, view, v, int(closed), settings.object_width, by_map_width,
-            settings.range_noise, settings.cell, map_cells, frame, reach, far_side,
+            settings.range_noise, map_cells, frame, reach, far_side,
         )  # fmt: skip
         ranges[v, :n] = r
         met[v, :n] = labels

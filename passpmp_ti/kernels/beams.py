@@ -70,6 +70,17 @@ def end_y(view: ti.template(), v, beam, r):
     return view[v, 1] + r * ti.sin(view[v, 2] + beam * view[v, 3])
 
 
+@ti.func
+def met_at(met: ti.template(), n, closed, beam):
+    """What a beam met, counted round where the beams go all the way; beyond the field: nothing."""
+    label = NOTHING
+    if closed == 1:
+        label = met[(beam % n + n) % n]
+    elif beam >= 0 and beam < n:
+        label = met[beam]
+    return label
+
+
 @ti.kernel
 def label_by_map(
     # in
@@ -110,6 +121,17 @@ def label_by_map(
                         dy = end_y(view, v, other, ranges[other]) - y
                         if dx * dx + dy * dy < width * width:
                             met[beam] = DOUBTED
+            # The rest of him may be where no beam tells: the wall is taken for wall only between
+            # returns that are it too.
+            for way in ti.static(range(2)):
+                other = beam + 2 * way - 1
+                passed = 0
+                while passed < n and met_at(met, n, closed, other) == LOST:
+                    other += 2 * way - 1
+                    passed += 1
+                beside = met_at(met, n, closed, other)
+                if beside == NOTHING or beside == MOVABLE or beside == LOST:
+                    met[beam] = DOUBTED
     for beam in range(n):
         if met[beam] == DOUBTED:
             met[beam] = MOVABLE
@@ -126,7 +148,6 @@ def prove_wedges(
     width: ti.f32,
     by_map_width: ti.f32,  # of the widest wedge that what the map alone calls static may shut
     noise: ti.f32,
-    cell: ti.f32,
     map_static: Bytes2,
     frame: Floats,  # [6]
     # out
@@ -179,9 +200,10 @@ def prove_wedges(
                 if gap + 2.0 * noise <= width:
                     side = SHUT
                 elif frame[5] > 0.5:
-                    # a wall at a grazing angle: the map must know it all the way
+                    # a wall at a grazing angle: the map must know it all the way, asked more
+                    # densely than the narrowest door is wide on the map
                     side = SHUT
-                    pieces = ti.cast(gap / cell, ti.i32) + 1
+                    pieces = ti.cast(2.0 * gap * frame[4], ti.i32) + 1
                     for k in range(pieces):
                         share = (k + 0.5) / pieces
                         if not mapped(map_static, frame, xa + share * dx, ya + share * dy):

@@ -122,10 +122,10 @@ def random_case(generator, *, plain=False):
         settings = _with_a_clearing(settings, generator, world, position, robot, scale)
     static_map = None
     if declared == "map":
-        settings = settings.changed(
-            map_tolerance=float(generator.uniform(0.1, 0.49)) * settings.object_width
-        )
-        static_map = map_of(world, 0.05 * scale**0.5)
+        resolution = 0.05 * scale**0.5
+        most = 0.5 * (settings.object_width - 3 * resolution)
+        settings = settings.changed(map_tolerance=float(generator.uniform(0.2, 0.99)) * most)
+        static_map = map_of(world, resolution)
     # a sparse sensor on a map: one beam may meet somebody who leans on a wall
     beams = [360, 540, 720, 1440] + ([90, 180] if declared == "map" else [])
     scans = random_scans(
