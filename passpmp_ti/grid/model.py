@@ -293,8 +293,8 @@ class FutureModel:
 def _check_door(settings: Settings, resolution: float) -> None:
     """Refuse a map on which a door as wide as an object would be taken for wall.
 
-    Its jambs are grown by the tolerance and reach up to a cell into it; what is left must be as wide
-    as the cell that is sure to be asked.
+    Its jambs are grown by the tolerance and reach up to a cell into it; what is left must be as
+    wide as the cell that is sure to be asked.
     """
     left = settings.object_width - 2 * settings.map_tolerance - 2 * resolution
     if left < resolution:

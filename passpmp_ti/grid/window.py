@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-
 FARTHEST_ANCHOR = 200.0
 """[m] A braking path summed in single precision that far out is off by less than a millimetre."""
 

@@ -130,7 +130,7 @@ def label_by_map(
                     other += 2 * way - 1
                     passed += 1
                 beside = met_at(met, n, closed, other)
-                if beside == NOTHING or beside == MOVABLE or beside == LOST:
+                if LOST <= beside <= MOVABLE:
                     met[beam] = DOUBTED
     for beam in range(n):
         if met[beam] == DOUBTED:
