@@ -56,6 +56,7 @@ class Assumptions:
 
     object_speed: float
     object_width: float
+    object_radius: float
     blind_speed: float | None
     range_noise: float
     localisation_error: float

@@ -8,6 +8,8 @@ import numpy as np
 
 from passpmp_verify.border import SMALLEST, border, sources
 from passpmp_verify.distance import distance_to
+from passpmp_verify.opening import Opening, Origins
+from passpmp_verify.pieces import joined
 from passpmp_verify.static_map import StaticMap, Surfaces
 from passpmp_verify.view import Scan
 from passpmp_verify.wedges import views_of
@@ -36,7 +38,9 @@ class Gridless:
         static_map: declares surfaces that stay.
         map_tolerance: returns nearer than this to a mapped surface are that surface [m].
         localisation_error: greatest error of the scans' poses [m]; here it only says which wedges
-            a map may shut, the radius that is asked for holds the rest of it.
+            a map may shut and how large a disc surely hides, the radius that is asked for holds
+            the rest of it.
+        object_radius: every point of what moves lies in a disc of this radius inside it [m].
 
     Raises:
         ValueError: no scan, or scans of different instants.
@@ -56,6 +60,7 @@ class Gridless:
         static_map: StaticMap | None = None,
         map_tolerance: float = 0.1,
         localisation_error: float = 0.0,
+        object_radius: float = 0.0,
     ) -> None:
         if not scans:
             raise ValueError("Gridless: no scan given; nothing is proven without one")
@@ -72,6 +77,13 @@ class Gridless:
         self._sources, self._blind = sources(
             self.views, 2 * range_noise + ROUNDING, self.blind_speed < object_speed
         )
+        self._origins: tuple[Origins, ...] = ()
+        # views whose poses err apart leave less of a disc hidden, by no more than one error
+        radius = object_radius - localisation_error
+        if radius > 0:
+            pieces = joined([self._border, self._sources, self._blind])
+            opening = Opening(self.views, pieces, radius)
+            self._origins = tuple(map(opening.origins, (self._sources, self._blind)))
 
     def margins(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """How far points [n, 2] [m] are from what is not proven, at `stamp`.
@@ -80,17 +92,25 @@ class Gridless:
             [n] distances [m] to the nearest place that is not proven empty (0 where the point
             itself is not), to the nearest place that something may come out of, and to the nearest
             one of bearings that no scan covers, where those have a bound of their own. None is
-            longer than the true one; each is shorter by at most `RESOLUTION`.
+            longer than the true one; each is shorter by at most `RESOLUTION`, where objects have
+            no radius.
         """
         points = np.asarray(points, dtype=np.float64)
         proven = np.zeros(len(points), dtype=bool)
         for view in self.views:
             proven |= view.proves(points)
         to_unseen = np.where(proven, distance_to(points, self._border), 0.0)
+        to_source = distance_to(points, self._sources)
+        to_blind = distance_to(points, self._blind)
+        if self._origins:
+            # whoever comes passed both: neither is nearer than the other everywhere
+            seen, blind = self._origins
+            to_source = np.maximum(to_source, seen.distance_to(points))
+            to_blind = np.maximum(to_blind, blind.distance_to(points))
         return (
             np.maximum(to_unseen - RESOLUTION, 0.0),
-            np.maximum(distance_to(points, self._sources) - RESOLUTION, 0.0),
-            np.maximum(distance_to(points, self._blind) - RESOLUTION, 0.0),
+            np.maximum(to_source - RESOLUTION, 0.0),
+            np.maximum(to_blind - RESOLUTION, 0.0),
         )
 
     def room(self, points: np.ndarray, times: np.ndarray) -> np.ndarray:

@@ -56,3 +56,24 @@ def joined(parts: Sequence[Pieces]) -> Pieces:
     if not parts:
         return Pieces(*(np.zeros(0) for _ in PIECES_FIELDS))
     return Pieces(*(np.concatenate([getattr(p, f) for p in parts]) for f in PIECES_FIELDS))
+
+
+def split(pieces: Pieces, half: float) -> tuple[Pieces, np.ndarray]:
+    """(pieces cut so that `half` [m] is the most of each, [n] of which piece each is a part)."""
+    count = np.maximum(np.ceil(pieces.half / half), 1).astype(np.int64)
+    parent = np.repeat(np.arange(len(pieces)), count)
+    first = np.repeat(np.cumsum(count) - count, count)
+    begin = (np.arange(len(parent)) - first) / count[parent]
+    end = begin + 1 / count[parent]
+    p = pieces.take(parent)
+    angle, depth = p.high - p.low, p.to - p.from_
+    return Pieces(
+        p.x, p.y, p.low + begin * angle, p.low + end * angle, p.from_ + begin * depth,
+        p.from_ + end * depth,
+    ), parent  # fmt: skip
+
+
+def points_as_pieces(points: np.ndarray) -> Pieces:
+    """Points [n, 2] [m], each as a piece of no length."""
+    zero = np.zeros(len(points))
+    return Pieces(points[:, 0], points[:, 1], zero, zero, zero, zero)

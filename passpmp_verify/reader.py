@@ -36,6 +36,7 @@ def certificate_of(document: Mapping[str, Any]) -> Certificate:
     assumptions = Assumptions(
         object_speed=_number(said, "object_speed", least=0),
         object_width=_number(said, "object_width", above=0),
+        object_radius=_number(said, "object_radius", least=0),
         blind_speed=None if blind is None else _number(said, "blind_speed", least=0),
         range_noise=_number(said, "range_noise", least=0),
         localisation_error=_number(said, "localisation_error", least=0),

@@ -113,6 +113,7 @@ def model_of(
         static_map=static_map if moment.on_map else None,
         map_tolerance=assumptions.map_tolerance,
         localisation_error=assumptions.localisation_error,
+        object_radius=assumptions.object_radius,
     )
 
 

@@ -9,14 +9,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from oracle import attack, cases, exact, hidden
+from oracle import attack, cases, exact, gridless, hidden
 
 from passpmp_ti import CarLike, DifferentialDrive, Navigator, Settings, StaticMap
 from passpmp_ti.certificate.content import robot_of
 from passpmp_ti.certificate.writer import CertificateWriter
 from passpmp_ti.cli import main
 from passpmp_verify.document import CertificateError, digest, pack, read, unpack, write
-from passpmp_verify.gridless import RESOLUTION, Gridless
+from passpmp_verify.gridless import RESOLUTION
 from passpmp_verify.reader import certificate_of, robot_from
 from passpmp_verify.verify import model_of, verify, verify_file
 
@@ -104,18 +104,6 @@ def with_path(document, times, states, brakes_from=None):
     if brakes_from is not None:
         path["brakes_from"] = brakes_from
     return changed
-
-
-def gridless_of(case):
-    """The exact model of a case, as it is believed."""
-    s, (x, y, theta) = case.settings, case.position
-    body = [(x + o * np.cos(theta), y + o * np.sin(theta), r) for o, r in case.robot.discs]
-    return Gridless(
-        case.scans, body, (x, y, s.clear_radius) if s.clear_radius > 0 else None,
-        object_width=s.object_width, range_noise=s.range_noise, object_speed=s.object_speed,
-        blind_speed=s.blind_speed, stamp_error=s.stamp_error, static_map=case.static_map,
-        map_tolerance=s.map_tolerance,
-    )  # fmt: skip
 
 
 # what is emitted -------------------------------------------------------------------------------
@@ -484,15 +472,11 @@ def test_what_the_planner_calls_free_is_free_and_nobody_reaches_what_the_verifie
         generator = np.random.default_rng([77, seed])
         case = cases.random_case(generator)
         settings = case.settings
-        if getattr(settings, "object_radius", 0.0) > 0:
-            # the verifier lets points hide where the planner need not
-            case = replace(case, settings=settings.changed(object_radius=0.0))
-            settings = case.settings
         states, times = cases.random_states(case, 300, generator)
         points, radius = states[:, :2], case.robot.disc_radius
         need = radius + settings.tracking_error + 2 * settings.localisation_error
         claimed = ~case.model().occupied(points, times)
-        free = gridless_of(case).free(points, need, times)
+        free = gridless.gridless(case).free(points, need, times)
         assert free[claimed].all(), f"seed {seed}"
         true = case.true_states(states, generator)[free, :2]
         attackers = hidden.hidden_discs(case, 200, generator)
@@ -511,7 +495,7 @@ def test_distances_are_those_to_the_nearest_place_that_is_not_proven():
     for seed in range(12):
         generator = np.random.default_rng([78, seed])
         case = cases.random_case(generator)
-        model = gridless_of(case)
+        model = gridless.gridless(case)
         points = cases.random_states(case, 30, generator)[0][:, :2]
         to_unseen = model.margins(points)[0]
 

@@ -12,13 +12,15 @@ STEP = 0.02
 
 
 def gridless(case):
-    """What the scans of a case prove, in closed form."""
-    settings = case.settings
+    """What the scans of a case prove, in closed form, as it is believed."""
+    s, (x, y, theta) = case.settings, case.position
+    body = [(x + o * np.cos(theta), y + o * np.sin(theta), r) for o, r in case.robot.discs]
     return Gridless(
-        case.scans, [tuple(disc) for disc in case.body],
-        object_width=settings.object_width, range_noise=settings.range_noise,
-        object_speed=settings.object_speed, blind_speed=settings.blind_speed,
-        stamp_error=settings.stamp_error,
+        case.scans, body, (x, y, s.clear_radius) if s.clear_radius > 0 else None,
+        object_width=s.object_width, range_noise=s.range_noise, object_speed=s.object_speed,
+        blind_speed=s.blind_speed, stamp_error=s.stamp_error, static_map=case.static_map,
+        map_tolerance=s.map_tolerance, localisation_error=s.localisation_error,
+        object_radius=s.object_radius,
     )  # fmt: skip
 
 
