@@ -144,8 +144,24 @@ def _labelled_by_map(
             one, two = here[inside], other[inside] % n
             apart = np.hypot(*(ends[two] - ends[one]).T)
             doubted[one] |= off_map[two] & (apart < width)
+    doubted |= _beside_no_surface(met, on_map, closed)
     result = met.copy()
     result[on_map & ~doubted] = STATIC_BY_MAP
+    return result
+
+
+def _beside_no_surface(met: np.ndarray, on_map: np.ndarray, closed: bool) -> np.ndarray:
+    """[n] bool: beams next to one that met nothing or nothing that stays, or to the field's edge.
+
+    The rest of somebody who leans on the wall may be there. Lost beams are passed over.
+    """
+    told = np.flatnonzero(met != LOST)
+    open_end = (met[told] < STATIC) & ~on_map[told]
+    before, after = np.roll(open_end, 1), np.roll(open_end, -1)
+    if not closed and len(told):
+        before[0] = after[-1] = True
+    result = np.zeros(len(met), dtype=bool)
+    result[told] = before | after
     return result
 
 
