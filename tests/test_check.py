@@ -63,6 +63,13 @@ def test_a_robot_that_turns_on_the_spot_is_looked_at():
     assert model.touched(states, settings.time_step * np.arange(3))[:2].all()
 
 
+def test_samples_too_far_apart_are_not_judged_clear():
+    states, times = straight(1.0, 0.0, 10)
+    assert not model_with({}).touched(states, times).any()
+    assert model_with({}).touched(states, 2 * times)[:-1].all()
+    assert not model_with({}).touched(states, 0.5 * times).any()
+
+
 def test_a_robot_at_rest_is_never_touched():
     states = np.zeros((3, 5))
     assert not model_with({0: 0}).touched(states, 0.02 * np.arange(3)).any()

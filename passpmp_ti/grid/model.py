@@ -231,7 +231,7 @@ class FutureModel:
         """Along a path, asked at the look-ups of the check: could anything touch the robot?
 
         Args:
-            states: [n, 5] a time step apart.
+            states: [n, 5] at most a time step apart; what is farther apart is not judged clear.
             times: [n] absolute [s], increasing.
 
         Returns:

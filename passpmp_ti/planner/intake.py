@@ -30,6 +30,9 @@ MOUNT_SLACK = 1e-3
 MOUNT_TURN_SLACK = 0.02
 """The same for its bearing [rad]."""
 
+FIELD_SLACK = 1e-3
+"""[rad] by which a field of view may be narrower than at first."""
+
 Mount = tuple[float, float, float]
 
 
@@ -107,6 +110,8 @@ class Intake:
         )
         self._spare = 0.5 * settings.cycle
         self._mounts: list[Mount] = []
+        self._fields: list[tuple[float, float]] = []
+        self._blind_apart = settings.unseen_speed < settings.object_speed
         self._last = -math.inf
         self._doubted = False
         self._other: tuple[float, float] | None = None  # (first, newest) stamp of another clock
@@ -126,7 +131,7 @@ class Intake:
         known = state_in(state)
         if known is None:
             return Heard(stamp=stamp, trouble="the robot's state is not known")
-        trouble = self._mounting_trouble(scans, known)
+        trouble = self._mounting_trouble(scans, known) or self._silence(scans)
         if trouble:
             return Heard(stamp=stamp, trouble=trouble)
         trouble, anew = self._clock(stamp, known, held)
@@ -142,6 +147,7 @@ class Intake:
         assert heard.state is not None
         if not self._mounts:
             self._mounts = [_mount(s.pose, heard.state) for s in heard.scans]
+            self._fields = [_field(s) for s in heard.scans]
         self._last = heard.stamp
         self._doubted, self._other = False, None
 
@@ -161,6 +167,22 @@ class Intake:
                     f"the sensor's pose does not fit the robot's: {apart:.2f} m and {turn:.2f} rad"
                     " off where it sits"
                 )
+        return ""
+
+    def _silence(self, scans: tuple[Scan, ...]) -> str:
+        """Whether a sensor says less than at first, where that would pass for a blind sector.
+
+        What comes out of bearings that are never covered has a bound of its own. Bearings that are
+        only not covered now have not.
+        """
+        if not self._blind_apart or not self._fields:
+            return ""
+        now = [_field(s) for s in scans]
+        for low, high in self._fields:
+            held = [n for n in now if n[0] <= low + FIELD_SLACK and n[1] >= high - FIELD_SLACK]
+            if not held:
+                return "a sensor is silent, or sees less than it did"
+            now.remove(held[0])
         return ""
 
     def _clock(self, stamp: float, state: np.ndarray, held: Trajectory) -> tuple[str, str]:
@@ -197,6 +219,11 @@ class Intake:
         if resting and stamp - self._other[0] >= max(held.end - self._last, SETTLE):
             return "", f"the clock jumped by {jump:.1f} s"
         return f"the clock jumped by {jump:.1f} s", ""
+
+
+def _field(scan: Scan) -> tuple[float, float]:
+    """First and last bearing of a scan in its sensor's frame [rad]."""
+    return scan.angle_min, scan.angle_min + (len(scan.ranges) - 1) * scan.angle_increment
 
 
 def _mount(pose: tuple[float, float, float], state: np.ndarray) -> Mount:
