@@ -6,6 +6,8 @@ from oracle import exact
 
 from passpmp_ti import CarLike, DifferentialDrive, Navigator, Scan, Settings
 from passpmp_ti.faults.kinds import INSIDE, broken_inside
+from passpmp_ti.planner.place import only_fits_now
+from passpmp_ti.trajectory import Trajectory
 
 CHAIR = DifferentialDrive()
 SETTINGS = Settings.for_robot(
@@ -368,6 +370,47 @@ def test_a_sensor_that_sees_nothing_any_more_is_not_believed():
     state = held.at(stamp)
     navigator.update(scan_at(state, stamp, world), state)
     assert not navigator.record.lost_scan
+
+
+def test_such_a_sensor_is_believed_in_the_end_when_the_robot_is_long_at_rest():
+    world = exact.world_of([exact.box(3.5, y, 1.0, 1.0) for y in (-3.0, -1.5, 1.5, 3.0)])
+    navigator, stamp, state = underway(world, goal=(2.0, 0.0))
+    held, first = navigator.held, stamp
+    for _ in range(60):
+        state = held.at(stamp)
+        blind = Scan(np.full(360, 1e9), -np.pi, 2 * np.pi / 360, 6.0, tuple(state[:3]), stamp)
+        after = navigator.update(blind, state)
+        if not navigator.record.lost_scan:
+            break
+        assert after is held
+        stamp += CYCLE
+    assert "for long" in navigator.record.forgot
+    assert CHAIR.at_rest(state)
+    assert stamp - first > 4.5
+
+
+def test_a_blind_sensor_is_not_believed_because_the_clock_was_put_back():
+    box = exact.world_of([exact.box(3.5, y, 1.0, 1.0) for y in (-3.0, -1.5, 1.5, 3.0)])
+    still = Navigator(CHAIR, SETTINGS, (0.0, 0.0))
+    for stamp in (1.0, 1.1, 1.05, 1.2):
+        scan = scan_at(REST, stamp, box)
+        stays = np.zeros(360, dtype=bool)
+        ranges = np.full(360, 1e9) if stamp == 1.2 else scan.ranges
+        still.update(Scan(ranges, scan.angle_min, scan.angle_increment, 6.0, scan.pose, stamp,
+                          moving=stays), REST)  # fmt: skip
+    assert "are gone" in still.record.lost_scan
+
+
+def test_the_place_tells_the_time_only_where_no_other_time_fits():
+    times = 0.1 * np.arange(21)
+    states = np.zeros((21, 5))
+    states[:, 0] = np.minimum(times, 1.5)
+    road = Trajectory(times, states, 0)
+    near = (0.01, 0.1)
+    assert only_fits_now(road, road.at(1.0), 1.0, near, 0.05)
+    assert not only_fits_now(road, road.at(1.0), 0.5, near, 0.05)  # it is not there
+    assert not only_fits_now(road, road.at(1.495), 1.495, near, 0.05)  # there it will stay
+    assert not only_fits_now(road, road.at(1.0), 1.0, (0.2, 0.1), 0.05)  # too wide to tell
 
 
 @pytest.mark.parametrize("where", list(INSIDE))

@@ -26,7 +26,7 @@ from passpmp_ti.planner.plan import (
 from passpmp_ti.planner.record import CycleRecord
 from passpmp_ti.planner.swarm import Swarm, best_leaf
 from passpmp_ti.planner.tree import ROOT, Tree, TreeGrower
-from passpmp_ti.planner.vanished import surfaces, vanished
+from passpmp_ti.planner.vanished import BELIEVED_AT_LAST, Belief
 from passpmp_ti.robots import Robot
 from passpmp_ti.scan import Scan
 from passpmp_ti.settings import Settings
@@ -38,9 +38,6 @@ is what f32 sums can tell: the held one wins ties. Small against the least progr
 since a cost to go of a minute is no reason to stand."""
 LONGEST_MEMORY = 60.0
 """[s] What is older is forgotten: ticks end at 65.5 s, and an age that overflows would promise."""
-LONGEST_DOUBT = 5.0
-"""[s] for which scans are not believed that say that surfaces are gone."""
-BELIEVED_AT_LAST = "surfaces were gone for long"
 
 
 class Navigator:
@@ -78,10 +75,10 @@ class Navigator:
         """The last model of the future; the memory of the next one."""
         self.record = CycleRecord(stamp=-math.inf, decision="held", reason="no cycle yet")
         self._intake = Intake(robot, settings)
+        self._belief = Belief()
         self._road: Trajectory  # what is held, and what was followed until it begins
         self._heard_at = -math.inf  # stamp of the last model
         self._modelled = False  # whether there ever was a model
-        self._disbelieved: float | None = None  # stamp since which scans are not believed
         self._generator = np.random.default_rng(seed)
         self._grower = TreeGrower(robot, settings)
         self._swarm = Swarm(settings) if settings.optimizer == "pso" else None
@@ -167,28 +164,31 @@ class Navigator:
             return self._holding(heard.stamp, heard.trouble, lost=True, not_taken=not_taken)
         assert heard.state is not None
         stamp, forgot = heard.stamp, heard.anew
-        if forgot:
-            still = Trajectory.resting(self.robot.within_limits(heard.state), stamp)
-            self._hold(still, anew=True)
-        deviation, turn = gap(self._road, heard.state, stamp)
+        still = Trajectory.resting(self.robot.within_limits(heard.state), stamp)
+        deviation, turn = gap(still if heard.anew else self._road, heard.state, stamp)
         allowed = allowed_gap(self.robot, self.settings)
         lost = deviation > allowed[0] or turn > allowed[1]
         if lost:
             forgot = "off its plan"
         if self.model is not None and not forgot and stamp - self.model.stamp > LONGEST_MEMORY:
             forgot = "too long ago"
+        witness = None if lost else self.model
         if forgot:
             # where memory was, or when, is not known any more
             self.model = self._guide = None
         model = self._model(heard, lost)
         modelled = time.perf_counter()
-        if self.model is not None and not len(model.broken_premises):
-            doubt = self._disbelief(self.model, model)
+        if witness is not None and not len(model.broken_premises):
+            rests = bool(heard.anew) or stamp >= self.held.end
+            doubt = self._belief.doubt(witness, model, timeless=bool(forgot), rests=rests)
             if doubt == BELIEVED_AT_LAST:
                 self.model = self._guide = None
                 model, forgot = self._model(heard, lost), doubt
             elif doubt:
+                self.model = witness
                 return self._holding(stamp, doubt, lost=True, not_taken=not_taken)
+        if heard.anew:
+            self._hold(still, anew=True)
         start = stamp + self.settings.cycle
         root = self._road.at(start)
         record = CycleRecord(
@@ -205,7 +205,7 @@ class Navigator:
                 record, decision="brake", reason=alarm, chosen=self.held,
                 plan_time=max(self.held.end - start, 0.0), decision_time=0.0,
             )  # fmt: skip
-        self.model, self._modelled, self._disbelieved = model, True, None
+        self.model, self._modelled = model, True
         self._heard_at = stamp
         self._intake.used(heard)
         if not alarm:
@@ -229,25 +229,6 @@ class Navigator:
             heard.scans, self.robot, settings, self.model, None if lost else self.static_map,
             position=(x, y, theta),
         )  # fmt: skip
-
-    def _disbelief(self, before: FutureModel, model: FutureModel) -> str:
-        """Why the scans are not believed; empty where they are.
-
-        Once doubted, they are believed again when they see about as much as before, or after
-        `LONGEST_DOUBT` seconds, when the robot is long at rest.
-        """
-        doubt = vanished(before, model)
-        if self._disbelieved is None:
-            if doubt:
-                self._disbelieved = model.stamp
-            return doubt
-        if not doubt and 2 * surfaces(model) >= surfaces(before):
-            return ""
-        assert self.held is not None
-        waited = model.stamp - self._disbelieved
-        if waited >= LONGEST_DOUBT and model.stamp >= self.held.end:
-            return BELIEVED_AT_LAST
-        return doubt or "fewer surfaces than before they were gone"
 
     def _alarm(self, record: CycleRecord, lost: bool, allowed: tuple[float, float]) -> str:
         """Why the robot has to brake at once; empty where it need not."""
@@ -322,11 +303,12 @@ class Navigator:
         if plan is not None:
             self._hold(plan)
         return replace(
-            record, decision="held" if plan is None else "new", reason="" if plan is not None else reason,
-            timings=timings, tree=tree, tree_nodes=tree.count, tree_depth=tree.depth,
-            tree_stopped_by=tree.stopped_by, cost=cost_held if plan is None else cost_new,
-            cost_new=cost_new, cost_held=cost_held, plan_time=max(chosen.end - start, 0.0),
-            decision_time=delay, particle_leaves=particles, chosen=chosen,
+            record, decision="held" if plan is None else "new",
+            reason=reason if plan is None else "", timings=timings, tree=tree,
+            tree_nodes=tree.count, tree_depth=tree.depth, tree_stopped_by=tree.stopped_by,
+            cost=cost_held if plan is None else cost_new, cost_new=cost_new, cost_held=cost_held,
+            plan_time=max(chosen.end - start, 0.0), decision_time=delay,
+            particle_leaves=particles, chosen=chosen,
         )  # fmt: skip
 
     def _arrive(self, state: np.ndarray, root: np.ndarray, start: float) -> bool:

@@ -70,9 +70,13 @@ def only_fits_now(
     If so the clock is right to within `spare` [s]: no other reading fits the place.
     """
     apart, turn = gap(held, state, time)
-    if apart > allowed[0] or turn > allowed[1] or time >= held.end:
+    if apart > allowed[0] or turn > allowed[1]:
         return False
-    times, _ = moments_on(held, state, (2 * allowed[0], 2 * allowed[1]))
+    wide = (2 * allowed[0], 2 * allowed[1])
+    apart, turn = gap(held, state, held.end)
+    if apart <= wide[0] and turn <= wide[1]:
+        return False  # there it stays: it may be any time
+    times, _ = moments_on(held, state, wide)
     return bool((np.abs(times - time) <= spare).all())
 
 

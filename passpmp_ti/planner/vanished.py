@@ -15,29 +15,71 @@ MOST_REACH = 200
 """[cells] Who may have gone farther than this is not asked about."""
 
 
+LONGEST_DOUBT = 5.0
+"""[s] for which scans are not believed that say that surfaces are gone."""
+BELIEVED_AT_LAST = "surfaces were gone for long"
+"""Why memory is given up against such scans."""
+
+
+class Belief:
+    """Counts for how long scans have not been believed."""
+
+    def __init__(self) -> None:
+        self._cycles = 0
+
+    def doubt(self, before: FutureModel, now: FutureModel, *, timeless: bool, rests: bool) -> str:
+        """Why the scans of `now` are not believed; empty where they are.
+
+        Once doubted, they are believed again when they see about as much as before, or, with
+        `BELIEVED_AT_LAST`, after `LONGEST_DOUBT` of cycles, when the robot is long at rest.
+
+        Args:
+            before: the last model that was believed.
+            now: the model of the scans in question.
+            timeless: nobody knows how long ago `before` was.
+            rests: what the robot follows has ended.
+        """
+        doubt = vanished(before, now, timeless=timeless)
+        if not doubt and (not self._cycles or 2 * surfaces(now) >= surfaces(before)):
+            self._cycles = 0
+            return ""
+        self._cycles += 1
+        if rests and self._cycles * now.settings.cycle > LONGEST_DOUBT:
+            self._cycles = 0
+            return BELIEVED_AT_LAST
+        return doubt or "fewer surfaces than before they were gone"
+
+
 def surfaces(model: FutureModel) -> int:
     """How many cells hold a surface."""
     return int(np.count_nonzero(model.static) + np.count_nonzero(model.movable))
 
 
-def vanished(before: FutureModel, now: FutureModel) -> str:
+def vanished(before: FutureModel, now: FutureModel, *, timeless: bool = False) -> str:
     """Why the scans of `now` cannot be true after those of `before`; empty where they can.
 
     Whoever was met at a place is still within reach of it, and a surface that stays is still
     there. So not all of the square about it, as wide as it may have moved, can be proven empty.
     Where it is, a beam passed through something: a sensor that sees nothing any more and says
     "nothing there".
+
+    Args:
+        before: the last model that was believed.
+        now: the model of the scans in question.
+        timeless: nobody knows how long ago `before` was; only what stays is asked about.
     """
     settings = now.settings
     age = now.stamp - before.stamp + settings.stamp_error
     # both scans may be off, and a surface is known to a cell only
     margin = 2 * (settings.range_noise + settings.localisation_error) + 2 * now.cell
     asked = gone = 0
+    apart = np.array(before.window.anchor) - np.array(now.window.anchor)
     shift = np.array(before.window.corner) - np.array(now.window.corner)
+    shift += np.rint(apart / now.cell).astype(int)
     sums: np.ndarray | None = None
     for mask, speed in ((before.static, 0.0), (before.movable, settings.object_speed)):
-        reach = math.ceil((speed * age + margin) / now.cell)
-        if reach > MOST_REACH:
+        reach = math.ceil((speed * age + margin) / now.cell) + 1
+        if reach > MOST_REACH or (timeless and speed > 0):
             continue
         j, i = np.divmod(np.flatnonzero(mask), mask.shape[1])
         i, j = i + shift[0], j + shift[1]

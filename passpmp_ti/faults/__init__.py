@@ -1,0 +1,1 @@
+"""Faults of sensors, clocks and planners, and broken premises, put into running cycles."""
