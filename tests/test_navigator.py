@@ -4,10 +4,9 @@ import numpy as np
 import pytest
 from oracle import exact
 
-from passpmp_ti import CarLike, DifferentialDrive, Navigator, Scan, Settings
+from passpmp_ti import CarLike, DifferentialDrive, Navigator, Scan, Settings, Trajectory
 from passpmp_ti.faults.kinds import INSIDE, broken_inside
 from passpmp_ti.planner.place import only_fits_now
-from passpmp_ti.trajectory import Trajectory
 
 CHAIR = DifferentialDrive()
 SETTINGS = Settings.for_robot(
@@ -537,3 +536,83 @@ def test_a_plan_that_comes_after_the_deadline_is_dropped():
     assert "deadline" in navigator.record.reason
     assert CHAIR.at_rest(held.at(1e9))
     assert held.states[-1, :2].tolist() == [0.0, 0.0]
+
+
+# what the executor says ------------------------------------------------------------------------
+
+
+def bad_followings(navigator):
+    held = navigator.held
+    n = len(held.times)
+    beyond, unfinished = held.states.copy(), held.states.copy()
+    beyond[:, 3] = 100.0
+    unfinished[-1, 3:] = 0.2
+    return [
+        "nothing", Trajectory(np.zeros(0), np.zeros((0, 5)), 0),
+        Trajectory(held.times, held.states[:, :4], 0), Trajectory(held.times, beyond, 0),
+        Trajectory(held.times, np.full((n, 5), np.nan), 0), Trajectory(held.times, unfinished, 0),
+        Trajectory(held.times[::-1], held.states, 0),
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize("number", range(7))
+def test_what_nobody_can_follow_is_answered_by_braking(number):
+    navigator, stamp, state = underway()
+    answer = navigator.update(
+        scan_at(state, stamp), state, following=bad_followings(navigator)[number]
+    )
+    assert navigator.record.decision == "brake"
+    assert "said to follow" in navigator.record.fault
+    assert CHAIR.at_rest(answer.states[-1])
+    # the next cycle goes on as if nothing had been
+    stamp += CYCLE
+    navigator.update(scan_at(answer.at(stamp), stamp), answer.at(stamp))
+    assert not navigator.record.fault
+
+
+def test_a_path_with_a_gap_is_not_taken_for_clear():
+    navigator, stamp, state = underway()
+    held = navigator.held
+    assert not CHAIR.at_rest(held.at(stamp + CYCLE))
+    sparse = Trajectory(held.times[[0, -1]], held.states[[0, -1]], 0)
+    navigator.update(scan_at(state, stamp), state, following=sparse)
+    assert navigator.record.decision == "brake"
+
+
+def test_a_disc_is_declared_clear_at_the_start_and_then_only():
+    settings = Settings.for_robot(
+        CHAIR, object_speed=0.5, cell=0.1, blind_speed=0.0, clear_radius=1.5, capacity=100,
+        particles=10, iterations=5,
+    )  # fmt: skip
+
+    def half(state, stamp):
+        pose = tuple(float(v) for v in state[:3])
+        return exact.sweep(OPEN, pose, 180, np.pi, 6.0, stamp)
+
+    behind = np.array([[-0.8, 0.0]])
+    prompt = Navigator(CHAIR, settings, (3.0, 0.0))
+    prompt.update(half(REST, 0.0), REST)
+    assert not prompt.model.occupied(behind, [0.1]).any()
+    late = Navigator(CHAIR, settings, (3.0, 0.0))
+    late.update([half(REST, 0.0), half(REST, 0.01)], REST)  # of different instants: not used
+    late.update(half(REST, 0.1), REST)
+    assert late.model.occupied(behind, [0.2]).any()
+
+
+def test_a_silent_sensor_is_no_blind_sector():
+    settings = Settings.for_robot(
+        CHAIR, object_speed=0.5, cell=0.1, blind_speed=0.0, clear_radius=1.5, capacity=100,
+        particles=10, iterations=5,
+    )  # fmt: skip
+    navigator = Navigator(CHAIR, settings, (3.0, 0.0))
+
+    def both(stamp):
+        return [
+            exact.sweep(OPEN, (x, 0.0, way), 180, 0.9 * np.pi, 6.0, stamp)
+            for x, way in ((0.1, 0.0), (-0.1, np.pi))
+        ]
+
+    navigator.update(both(0.0), REST)
+    assert not navigator.record.lost_scan
+    navigator.update(both(0.1)[:1], REST)
+    assert "silent" in navigator.record.lost_scan

@@ -23,7 +23,8 @@ class Driver(Navigator):
     def _guide_field(self, model: FutureModel, state: np.ndarray) -> GuideField:
         if self._kept is not None:
             age, goal, field = self._kept
-            if age < GUIDE_CYCLES and goal == self.goal:
+            same = goal == self.goal and field.anchor == model.window.anchor
+            if age < GUIDE_CYCLES and same:
                 self._kept = (age + 1, goal, field)
                 return field
         field = super()._guide_field(model, state)

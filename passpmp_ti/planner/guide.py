@@ -66,7 +66,8 @@ class Guide:
     ) -> None:
         self._robot = robot
         self._settings = settings
-        self._anchor = anchor
+        self.anchor = anchor
+        """World position of the device's origin [m]."""
         self._cruise = settings.cruise_speed or robot.top_speed
         places = np.array([start, *goals]) - np.array(anchor)
         pad = 0.4 * sensor_reach
@@ -83,7 +84,7 @@ class Guide:
     ) -> GuideField:
         """The cost to go to `goal`, given what this cycle's model shows from `position` [2]."""
         frame = np.zeros(11, dtype=np.float32)
-        local_goal = np.array(goal) - np.array(self._anchor)
+        local_goal = np.array(goal) - np.array(self.anchor)
         frame[:2] = self._low
         frame[2] = 1 / self._cell
         frame[3:5] = local_goal
@@ -94,22 +95,22 @@ class Guide:
         if self._settings.guide == "euclidean":
             frame[5] = 1
             nothing = np.zeros((2, 2, 2), dtype=np.float32)
-            return GuideField(nothing[0], nothing, frame, self._anchor)
-        self._mark(self._walls, _centres(model, model.static) - np.array(self._anchor))
+            return GuideField(nothing[0], nothing, frame, self.anchor)
+        self._mark(self._walls, _centres(model, model.static) - np.array(self.anchor))
         time = np.full(self._walls.shape, UNREACHED, dtype=np.float32)
         rows, columns = time.shape
         j = int(np.clip((local_goal[1] - self._low[1]) / self._cell, 0, rows - 1))
         i = int(np.clip((local_goal[0] - self._low[0]) / self._cell, 0, columns - 1))
         time[j, i] = 0.0
         sweep((self._cell / self._speed(model)).astype(np.float32), MOST_ROUNDS, time)
-        here = (np.asarray(position) - np.array(self._anchor) - self._low) / self._cell
+        here = (np.asarray(position) - np.array(self.anchor) - self._low) / self._cell
         low = np.clip(np.floor(here - AROUND), 0, None).astype(int)
         high = np.minimum(np.ceil(here + AROUND), (columns, rows)).astype(int)
         frame[8:10] = low
         ahead = np.zeros((*np.maximum(high - low, 1)[::-1], 2), dtype=np.float32)
         if (high > low).all():
             point_ahead(time, AHEAD, int(low[1]), int(low[0]), ahead)
-        return GuideField(time, ahead, frame, self._anchor)
+        return GuideField(time, ahead, frame, self.anchor)
 
     def _speed(self, model: FutureModel) -> np.ndarray:
         """[J, I] speed that will be safe at each place [m/s].
@@ -122,10 +123,10 @@ class Guide:
         clearance = settings.clearance(robot)
         speed = np.full(self._walls.shape, cruise)
         corners = np.ones(self._walls.shape, dtype=np.uint8)
-        self._mark(corners, _centres(model, model.standing_sources) - np.array(self._anchor))
+        self._mark(corners, _centres(model, model.standing_sources) - np.array(self.anchor))
         if settings.guide_movers:
             # where they are now: nose to somebody who stands, a robot cannot even turn
-            self._mark(corners, _centres(model, model.movable) - np.array(self._anchor))
+            self._mark(corners, _centres(model, model.movable) - np.array(self.anchor))
         if settings.object_speed > 0 and not corners.all():
             room = distance_to_zeros(corners) * self._cell - clearance - settings.cell
             spare = room / settings.object_speed - 2 * settings.cycle

@@ -13,6 +13,7 @@ from passpmp_ti import backend, door
 from passpmp_ti.grid.model import FutureModel
 from passpmp_ti.grid.static_map import StaticMap
 from passpmp_ti.planner.coast import decision_time
+from passpmp_ti.planner.followed import trouble_with
 from passpmp_ti.planner.guide import Guide, GuideField
 from passpmp_ti.planner.intake import Heard, Intake, scans_in
 from passpmp_ti.planner.objective import leaf_costs, trajectory_cost
@@ -77,6 +78,7 @@ class Navigator:
         self._intake = Intake(robot, settings)
         self._belief = Belief()
         self._road: Trajectory  # what is held, and what was followed until it begins
+        self._started = -math.inf  # stamp of the first cycle
         self._heard_at = -math.inf  # stamp of the last model
         self._modelled = False  # whether there ever was a model
         self._generator = np.random.default_rng(seed)
@@ -147,7 +149,8 @@ class Navigator:
                 "Navigator.update: the first cycle needs a robot at rest, nothing is planned yet"
                 f" that could stop it; got {given!r}"
             )
-        return Trajectory.resting(given, scans[0].stamp)
+        self._started = scans[0].stamp
+        return Trajectory.resting(given, self._started)
 
     def _cycle(
         self, scan: object, state: object, following: Trajectory | None, began: float
@@ -155,19 +158,19 @@ class Navigator:
         """Hear, model, judge, plan. What is kept is replaced whole, or not at all."""
         assert self.held is not None
         not_taken = following is not None and following is not self.held
-        if not_taken:
-            if not isinstance(following, Trajectory):
-                raise TypeError(f"following is no Trajectory but {type(following).__name__}")
+        stray = trouble_with(following, self.robot) if not_taken else ""
+        if following is not None and not_taken and not stray:
             self.held = self._road = following
         heard = self._intake.hear(scan, state, self._road)
         if heard.trouble:
-            return self._holding(heard.stamp, heard.trouble, lost=True, not_taken=not_taken)
+            return self._holding(heard.stamp, heard.trouble, unheard=True, not_taken=not_taken)
         assert heard.state is not None
         stamp, forgot = heard.stamp, heard.anew
         still = Trajectory.resting(self.robot.within_limits(heard.state), stamp)
         deviation, turn = gap(still if heard.anew else self._road, heard.state, stamp)
         allowed = allowed_gap(self.robot, self.settings)
-        lost = deviation > allowed[0] or turn > allowed[1]
+        # what follows something that nobody knows is nowhere on its plan
+        lost = bool(stray) or deviation > allowed[0] or turn > allowed[1]
         if lost:
             forgot = "off its plan"
         if self.model is not None and not forgot and stamp - self.model.stamp > LONGEST_MEMORY:
@@ -186,19 +189,20 @@ class Navigator:
                 model, forgot = self._model(heard, lost), doubt
             elif doubt:
                 self.model = witness
-                return self._holding(stamp, doubt, lost=True, not_taken=not_taken)
+                return self._holding(stamp, doubt, unheard=True, not_taken=not_taken)
         if heard.anew:
             self._hold(still, anew=True)
         start = stamp + self.settings.cycle
         root = self._road.at(start)
+        proof = int(model.proving_brakes(root[None], np.array([start]))[0])
         record = CycleRecord(
             stamp=stamp, decision="held", goal=self.goal, deviation=deviation,
             turn_deviation=turn, not_taken=not_taken, forgot=forgot if self._modelled else "",
-            root_proved=int(model.proving_brakes(root[None], np.array([start]))[0]) >= 0,
+            root_proved=proof >= 0, fault=stray,
             held_clear=lost or still_clear(model, self.held, start),
             broken_premises=model.broken_premises, model=model,
         )  # fmt: skip
-        alarm = self._alarm(record, lost, allowed)
+        alarm = stray or self._alarm(record, lost, allowed)
         if alarm:
             self._brake(model, heard, start, lost)
             record = replace(
@@ -210,7 +214,7 @@ class Navigator:
         self._intake.used(heard)
         if not alarm:
             try:
-                record = self._plan(record, model, heard.state, root, start, began)
+                record = self._plan(record, model, heard.state, root, proof, start, began)
             except Exception as error:  # as above; the model is whole, and memory keeps it
                 self._guide = None
                 record = replace(
@@ -220,11 +224,12 @@ class Navigator:
         return replace(record, timings={"model": modelled - began, **record.timings})
 
     def _model(self, heard: Heard, lost: bool) -> FutureModel:
-        """W(t_k). A disc is declared clear about the start only, and a map's coordinates mean
-        nothing while the robot is not where it should be."""
+        """W(t_k). A disc is declared clear about the start, and then, only; a map's coordinates
+        mean nothing while the robot is not where it should be."""
         assert heard.state is not None
         x, y, theta = (float(v) for v in heard.state[:3])
-        settings = self.settings.changed(clear_radius=0.0) if self._modelled else self.settings
+        at_the_start = heard.stamp == self._started and not lost
+        settings = self.settings if at_the_start else self.settings.changed(clear_radius=0.0)
         return FutureModel.from_scan(
             heard.scans, self.robot, settings, self.model, None if lost else self.static_map,
             position=(x, y, theta),
@@ -247,7 +252,7 @@ class Navigator:
         stamp: float,
         reason: str,
         *,
-        lost: bool = False,
+        unheard: bool = False,
         fault: str = "",
         not_taken: bool = False,
     ) -> CycleRecord:
@@ -255,7 +260,7 @@ class Navigator:
         assert self.held is not None
         return CycleRecord(
             stamp=self.record.stamp if math.isnan(stamp) else stamp, decision="held",
-            reason=reason, lost_scan=reason if lost else "", fault=fault, not_taken=not_taken,
+            reason=reason, lost_scan=reason if unheard else "", fault=fault, not_taken=not_taken,
             goal=self.goal, plan_time=self.held.duration, chosen=self.held,
         )  # fmt: skip
 
@@ -265,6 +270,7 @@ class Navigator:
         model: FutureModel,
         state: np.ndarray,
         root: np.ndarray,
+        proof: int,
         start: float,
         began: float,
     ) -> CycleRecord:
@@ -279,7 +285,6 @@ class Navigator:
 
         guide = self._guide_field(model, state)
         clock.lap("guide")
-        proof = int(model.proving_brakes(root[None], np.array([start]))[0])
         tree = self._grower.grow(model, guide, root, start, proof)
         clock.lap("tree")
         leaf, particles, cost_new = self._choose(tree)
@@ -349,7 +354,7 @@ class Navigator:
         self.held = trajectory
 
     def _guide_field(self, model: FutureModel, state: np.ndarray) -> GuideField:
-        if self._guide is None:
+        if self._guide is None or self._guide.anchor != model.window.anchor:
             self._guide = Guide(
                 self.robot, self.settings, (float(state[0]), float(state[1])), self.goals,
                 model.window.anchor, model.window.inner_radius, self.static_map,

@@ -28,7 +28,9 @@ def allowed_gap(robot: Robot, settings: Settings) -> tuple[float, float]:
     No error of heading is declared: a robot that keeps within d of its plan is given d over its
     radius.
     """
-    apart = settings.tracking_error + settings.localisation_error + POSE_SLACK
+    # between samples the true way leaves the straight one
+    bend = robot.top_acceleration * settings.time_step**2 / 8
+    apart = settings.tracking_error + settings.localisation_error + bend + POSE_SLACK
     return apart, TURN_SLACK + apart / robot.radius
 
 
