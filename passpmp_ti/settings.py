@@ -31,8 +31,8 @@ class Settings:
     """Every point of a moving object lies in a disc of this radius inside the object [m]: nothing
     that moves hides where no such disc fits. 0: a point may hide in every sliver."""
     blind_speed: float | None = None
-    """Greatest speed of what comes out of bearings that no sensor ever covers [m/s]; None: as
-    `object_speed`; 0: what is there stands still."""
+    """Greatest speed, from then on, of what was within range in a bearing that no sensor covers
+    [m/s]; None: as `object_speed`; 0: what is there stands still for good, like a wall."""
     clear_radius: float = 0.0
     """Disc about the robot's start that is declared empty [m]; for robots with blind sectors."""
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from passpmp_ti.attack import band as bands
 from passpmp_ti.attack.band import Band
-from passpmp_ti.attack.blind import uncovered
+from passpmp_ti.attack.blind import uncovered, within_range
 from passpmp_ti.attack.case import Attack, Case, draw
 from passpmp_ti.attack.driver import Driver
 from passpmp_ti.attack.errors import (
@@ -89,6 +89,7 @@ class Attempt:
         self.top_speed = 0.0
         """Greatest speed of the robot [m/s]."""
         self._past = (np.array([0.0]), state[None])
+        self._stood = np.zeros(len(radius), dtype=bool)  # who was ever where no sensor looks
 
     def cycle(self, k: int, on_cycle: Callable[[CycleInfo], None] | None = None) -> None:
         """Scan, plan, and let everybody go on for one cycle."""
@@ -166,7 +167,10 @@ class Attempt:
             if self.attack.covered != "all":
                 blind = uncovered(scenario.lidars, states[tick + 1], places, movers.radius)
                 slow = scenario.settings.unseen_speed * self.attack.case.cheat_speed
-                limit = np.where(blind, np.minimum(limit, slow), limit)
+                self._stood |= blind & within_range(
+                    scenario.lidars, states[tick + 1], places, movers.radius
+                )
+                limit = np.where(blind | self._stood, np.minimum(limit, slow), limit)
             after = hunted_at(robot, 0.0, states[tick + 1], moving, 0.0, ways)
             movers.advance(velocity, limit, after.discs, robot.disc_radius)
         drive.follow(times, states)

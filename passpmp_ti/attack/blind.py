@@ -18,6 +18,9 @@ def uncovered(
 ) -> np.ndarray:
     """[m] bool: some of a disc lies in bearings that none of the range finders covers.
 
+    What was assumed of it there is assumed for good where it was within their range: the robot
+    remembers what it saw before, and that nobody came out of there.
+
     Args:
         lidars: of a robot that carries one, or whose sectors leave no gap.
         state: [5] of the robot.
@@ -36,3 +39,14 @@ def uncovered(
         half = np.arcsin(np.clip((radius + ROOM) / np.maximum(apart, 1e-9), 0.0, 1.0))
         blind &= bearing + half + TURN > 0.5 * lidar.field_of_view
     return blind
+
+
+def within_range(
+    lidars: Sequence[Lidar], state: np.ndarray, places: np.ndarray, radius: np.ndarray
+) -> np.ndarray:
+    """[m] bool: some of a disc is within the range of a range finder, whatever its bearing."""
+    near = np.zeros(len(places), dtype=bool)
+    for lidar in lidars:
+        apart = np.hypot(*(places - np.array(lidar.pose(state)[:2])).T)
+        near |= apart - radius - ROOM < lidar.range_max
+    return near
