@@ -62,7 +62,7 @@ class Executor:
         self.dropped = 0
         """Answers that came too late."""
         self.breaks = 0
-        """Answers that did not begin where the robot was when it took them."""
+        """Answers that did not begin where the robot was when they did: not taken."""
 
     @property
     def true_path(self) -> Trajectory:
@@ -94,7 +94,7 @@ class Executor:
         return time if time <= end + 1e-9 else None
 
     def take(self, time: float) -> None:
-        """Follow the next answer from `time` [s] on."""
+        """Follow the next answer from `time` [s] on, if it begins where the robot is then."""
         assert self._next is not None
         before, after = self.true_path.at(time), self._next[1].at(time)
         apart = math.dist(before[:2], after[:2])
@@ -102,6 +102,8 @@ class Executor:
         speed = abs(float(self._robot.speed(before) - self._robot.speed(after)))
         if self.answer is not None and (apart > JOIN[0] or turn > JOIN[1] or speed > JOIN[2]):
             self.breaks += 1
+            self._next = None
+            return
         self.answer, path = self._next
         self._past = [self._past[0], *self._past[1:][-60:], (time, path)]
         self._next = None

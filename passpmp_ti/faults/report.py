@@ -49,7 +49,7 @@ def markdown(found: Found) -> str:
     for robot, tallies in sorted(found.faults.items()):
         lines += [f"## Faults, {robot}", "", *_faults(tallies), ""]
         lines += [
-            "Must be 0: contacts moving, exceptions, held unsafe, unverified, breaks, silent.",
+            "Must be 0: contacts moving, exceptions, held unsafe, unverified, silent.",
             "",
         ]
     for robot, kinds in sorted(found.premises.items()):

@@ -27,7 +27,7 @@ class Tally:
     endless: int = 0
     """Answers that do not end at rest."""
     breaks: int = 0
-    """Answers that do not begin where the robot is."""
+    """Answers that did not begin where the robot was, and were not taken."""
     unverified: int = 0
     """New plans that the model which made them does not find free."""
     held_unclear: int = 0
@@ -58,7 +58,7 @@ class Tally:
     def failures(self) -> int:
         """Everything that must not happen."""
         return (
-            self.contacts_moving + self.exceptions + self.endless + self.breaks
+            self.contacts_moving + self.exceptions + self.endless
             + self.unverified + self.held_unclear + self.unrecorded
         )  # fmt: skip
 

@@ -80,6 +80,7 @@ class Navigator:
         self._road: Trajectory  # what is held, and what was followed until it begins
         self._started = -math.inf  # stamp of the first cycle
         self._heard_at = -math.inf  # stamp of the last model
+        self._laid = False  # whether what is held was verified by memory that had to be dropped
         self._modelled = False  # whether there ever was a model
         self._generator = np.random.default_rng(seed)
         self._grower = TreeGrower(robot, settings)
@@ -161,6 +162,7 @@ class Navigator:
         stray = trouble_with(following, self.robot) if not_taken else ""
         if following is not None and not_taken and not stray:
             self.held = self._road = following
+            self._laid = False
         heard = self._intake.hear(scan, state, self._road)
         if heard.trouble:
             return self._holding(heard.stamp, heard.trouble, unheard=True, not_taken=not_taken)
@@ -243,7 +245,8 @@ class Navigator:
             return f"turned {record.turn_deviation:.2f} rad off its plan"
         if len(record.broken_premises):
             return f"{len(record.broken_premises)} returns where nothing could be"
-        if not record.held_clear:
+        # what was laid anew was verified by memory that is gone: nothing since speaks against it
+        if not record.held_clear and not self._laid:
             return "what is held is not clear any more"
         return ""
 
@@ -345,6 +348,7 @@ class Navigator:
         )
         if rest is not None and model.proving_brakes(root[None], np.array([start])) < 0:
             self._hold(rest, anew=True)
+            self._laid = True
         else:
             self._hold(brake_at_once(model, root, start), anew=True)
 
@@ -352,6 +356,7 @@ class Navigator:
         """Hold it from its start on; `anew`: it has nothing to do with what was followed."""
         self._road = trajectory if anew else stitched(self._road, trajectory)
         self.held = trajectory
+        self._laid = False
 
     def _guide_field(self, model: FutureModel, state: np.ndarray) -> GuideField:
         if self._guide is None or self._guide.anchor != model.window.anchor:
