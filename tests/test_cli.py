@@ -2,7 +2,7 @@ import pytest
 
 from passpmp_ti.cli import BAD_INPUT, main
 
-COMMANDS = (["run"], ["map"], ["attack"], ["bench"], ["bench", "cycle"], ["scenarios"], [])
+COMMANDS = (["run"], ["map"], ["attack"], ["faults"], ["verify"], ["bench"], ["bench", "cycle"], ["scenarios"], [])
 
 
 @pytest.mark.parametrize("command", COMMANDS, ids=" ".join)
