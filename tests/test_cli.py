@@ -2,7 +2,10 @@ import pytest
 
 from passpmp_ti.cli import BAD_INPUT, main
 
-COMMANDS = (["run"], ["map"], ["attack"], ["faults"], ["verify"], ["bench"], ["bench", "cycle"], ["scenarios"], [])
+COMMANDS = (
+    ["run"], ["map"], ["attack"], ["faults"], ["verify"], ["bench"], ["bench", "cycle"],
+    ["scenarios"], [],
+)  # fmt: skip
 
 
 @pytest.mark.parametrize("command", COMMANDS, ids=" ".join)
