@@ -30,7 +30,7 @@ from passpmp_ti.attack.movers import SteeredMovers
 from passpmp_ti.attack.roadmap import Roadmap
 from passpmp_ti.scan import Scan
 from passpmp_ti.sim.drive import Drive
-from passpmp_ti.sim.episode import CycleInfo, Episode
+from passpmp_ti.sim.episode import CycleInfo, Episode, episode_of
 from passpmp_ti.sim.world import World
 from passpmp_ti.trajectory import Trajectory
 
@@ -179,24 +179,7 @@ class Attempt:
 
     def episode(self) -> Episode:
         """What happened so far."""
-        drive = self.drive
-        return Episode(
-            scenario=self.attack.scenario,
-            settings=self.attack.scenario.settings,
-            seed=self.attack.case.seed,
-            world=self.world,
-            start_time=0.0,
-            reached_at=None,
-            times=np.concatenate(drive.times),
-            states=np.concatenate(drive.states),
-            distance=drive.distance,
-            time_moving=drive.time_moving,
-            contacts=tuple(drive.judge.contacts),
-            nearest_mover=drive.judge.nearest_mover,
-            nearest_wall=drive.judge.nearest_wall,
-            records=tuple(drive.records),
-            update_times=np.array(drive.update_times),
-        )
+        return episode_of(self.drive, self.attack.scenario.settings, self.attack.case.seed)
 
     def digest(self) -> str:
         """The same for the same motion, to the last bit."""

@@ -73,9 +73,7 @@ def vanished(before: FutureModel, now: FutureModel, *, timeless: bool = False) -
     # both scans may be off, and a surface is known to a cell only
     margin = 2 * (settings.range_noise + settings.localisation_error) + 2 * now.cell
     asked = gone = 0
-    apart = np.array(before.window.anchor) - np.array(now.window.anchor)
-    shift = np.array(before.window.corner) - np.array(now.window.corner)
-    shift += np.rint(apart / now.cell).astype(int)
+    shift = now.window.cells_to(before.window)
     sums: np.ndarray | None = None
     for mask, speed in ((before.static, 0.0), (before.movable, settings.object_speed)):
         reach = math.ceil((speed * age + margin) / now.cell) + 1

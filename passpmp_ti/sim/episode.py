@@ -228,12 +228,23 @@ def simulate(
         if not drive.records:
             raise
         interrupted = True
+    return episode_of(drive, chosen, seed, reached_at, interrupted)
+
+
+def episode_of(
+    drive: Drive,
+    settings: Settings,
+    seed: int,
+    reached_at: float | None = None,
+    interrupted: bool = False,
+) -> Episode:
+    """What a drive came to so far; see `Episode` for the rest."""
     return Episode(
-        scenario=scenario,
-        settings=chosen,
+        scenario=drive.scenario,
+        settings=settings,
         seed=seed,
-        world=world,
-        start_time=start_time,
+        world=drive.world,
+        start_time=drive.start_time,
         reached_at=reached_at,
         times=np.concatenate(drive.times),
         states=np.concatenate(drive.states),
