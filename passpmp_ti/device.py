@@ -1,0 +1,71 @@
+"""Arrays where the kernels run: NumPy's memory on the CPU, the device's own on a GPU.
+
+Kernels take either. On the CPU a NumPy array costs no copy, so host and device are one; elsewhere
+only `host` and `put` copy, and what stays between them never leaves the device.
+"""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Iterator
+from typing import Any, TypeAlias
+
+import numpy as np
+
+from passpmp_ti import backend
+
+Array: TypeAlias = Any
+"""np.ndarray on the CPU, ti.ndarray where arrays are resident on a device."""
+
+_forced = False
+
+
+def resident() -> bool:
+    """Whether arrays live on a device that the host cannot read in place."""
+    return _forced or backend.running() not in (None, "cpu")
+
+
+@contextlib.contextmanager
+def forced() -> Iterator[None]:
+    """Keep arrays apart from the host even on the CPU: how a GPU's paths are tested without one."""
+    global _forced
+    before, _forced = _forced, True
+    try:
+        yield
+    finally:
+        _forced = before
+
+
+def empty(shape: tuple[int, ...], dtype: Any) -> Array:
+    """An array whose values are not set."""
+    if not resident():
+        return np.empty(shape, dtype=dtype)
+    import taichi as ti
+
+    return ti.ndarray(_taichi_type(dtype), shape)
+
+
+def put(values: np.ndarray) -> Array:
+    """`values` where the kernels read them; on the CPU the very same array."""
+    if not resident() or not isinstance(values, np.ndarray):
+        return values
+    array = empty(values.shape, values.dtype)
+    array.from_numpy(np.ascontiguousarray(values))
+    return array
+
+
+def host(array: Array) -> np.ndarray:
+    """`array` where NumPy reads it; on the CPU the very same array."""
+    return array if isinstance(array, np.ndarray) else array.to_numpy()
+
+
+def _taichi_type(dtype: Any) -> Any:
+    import taichi as ti
+
+    return {
+        "uint8": ti.u8,
+        "uint16": ti.u16,
+        "int32": ti.i32,
+        "uint32": ti.u32,
+        "float32": ti.f32,
+    }[np.dtype(dtype).name]
