@@ -36,6 +36,19 @@ def forced() -> Iterator[None]:
         _forced = before
 
 
+SHARE = 512
+"""Indices of a parallel loop that Taichi hands to one thread of a CPU at a time."""
+
+
+def share() -> int:
+    """How many indices of a parallel loop one thread is handed at a time.
+
+    On a CPU a loop over fewer indices runs on one thread. Kernels that have few but large pieces
+    of work loop over `share` times as many indices and work at the multiples.
+    """
+    return 1 if resident() else SHARE
+
+
 def empty(shape: tuple[int, ...], dtype: Any) -> Array:
     """An array whose values are not set."""
     if not resident():

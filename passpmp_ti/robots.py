@@ -74,6 +74,11 @@ class Robot:
         raise NotImplementedError
 
     @property
+    def sharpest_curvature(self) -> float:
+        """Greatest turn a metre of the reference point's way [rad/m]; infinite on the spot."""
+        return math.inf
+
+    @property
     def top_acceleration(self) -> float:
         """Bound on the acceleration of any disc's centre, curving way included [m/s^2]."""
         raise NotImplementedError
@@ -181,7 +186,11 @@ class CarLike(Robot):
 
     @property
     def top_turn_rate(self) -> float:
-        return self.v_max * math.tan(self.xi_max) / self.wheelbase
+        return self.v_max * self.sharpest_curvature
+
+    @property
+    def sharpest_curvature(self) -> float:
+        return math.tan(self.xi_max) / self.wheelbase
 
     @property
     def top_acceleration(self) -> float:

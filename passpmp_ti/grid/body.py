@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 
-from passpmp_ti.robots import Robot
+from passpmp_ti.grid.spans import span_begins
+from passpmp_ti.kernels.check import WAYS
+from passpmp_ti.kernels.spans import BEGIN, LEVELS, ROUNDING
+from passpmp_ti.robots import CAR, Robot
 from passpmp_ti.settings import LOOK, Settings
 
 MOST_DISCS = 8
@@ -19,7 +23,7 @@ class Body:
     kind: int
     numbers: np.ndarray
     counts: np.ndarray
-    """[8] int32; the window's corner and size are filled in by `placed`."""
+    """[15] int32; the window's corner and size are filled in by `placed`."""
     braking: np.ndarray
     controls: np.ndarray
 
@@ -31,14 +35,22 @@ class Body:
                 f"{type(robot).__name__}.discs has {len(robot.discs)} discs; the check takes at"
                 f" most {MOST_DISCS}: cover the body with fewer"
             )
-        numbers = np.zeros(18, dtype=np.float32)
+        numbers = np.zeros(WAYS + 2 * LEVELS, dtype=np.float32)
         numbers[0] = 1 / settings.cell
         numbers[1] = settings.time_step
         numbers[2:8] = robot.parameters()
         numbers[8 : 8 + len(robot.discs)] = [offset for offset, _ in robot.discs]
         numbers[16] = 0.5 / (LOOK * settings.cell)
         numbers[17] = settings.object_speed * settings.time_step
-        counts = np.zeros(8, dtype=np.int32)
+        numbers[18] = robot.overhang
+        numbers[19] = LOOK * settings.cell
+        numbers[21] = 1 / settings.step_ms
+        numbers[WAYS:] = ways_ahead(robot, settings).ravel()
+        rates = {rate for _, rate, _ in robot.braking}
+        if robot.kind == CAR and len(rates) == 1:
+            numbers[22] = rates.pop()
+            numbers[23] = max(abs(steering) for _, _, steering in robot.braking)
+        counts = np.zeros(BEGIN + LEVELS, dtype=np.int32)
         counts[4:8] = (
             settings.step_ms, len(robot.discs), len(robot.braking), len(robot.controls),
         )  # fmt: skip
@@ -51,9 +63,10 @@ class Body:
         )
 
     def placed(self, corner: tuple[int, int], size: int) -> np.ndarray:
-        """`counts` for a window: [8] int32."""
+        """`counts` for a window: [15] int32."""
         counts = self.counts.copy()
         counts[:4] = (*corner, size, size)
+        counts[BEGIN:] = span_begins(size)[:-1]
         return counts
 
 
@@ -75,3 +88,27 @@ def to_states(poses: np.ndarray, anchor: tuple[float, float]) -> np.ndarray:
     states[:, 1] = poses[:, 1].astype(np.float64) + anchor[1]
     states[:, 2:5] = poses[:, 4:7]
     return states
+
+
+def ways_ahead(robot: Robot, settings: Settings) -> np.ndarray:
+    """[LEVELS, 2] for each level of spans: how far ahead of the robot to look [m], and how many
+    time steps x speed [m/s] it may go on before it can leave the disc that the look speaks for.
+
+    On a way w that turns by no more than f = w x the sharpest curvature, every point is within
+    w sqrt(1 + 2 f^2) / 2 of the place w / 2 straight ahead, and within w of where it begins.
+    """
+    ways = np.zeros((LEVELS, 2))
+    for level in range(LEVELS):
+        # what sticks out before and behind must stay inside as well
+        radius = max((2 << level) * settings.cell - ROUNDING - robot.overhang, 0.0)
+        way, ahead = radius, 0.0
+        # the sharpest curvature times w: w^2 (1 + 2 k^2 w^2) = (2 radius)^2, solved for w
+        k2 = 2 * robot.sharpest_curvature**2
+        if math.isfinite(k2):
+            longer = 2 * radius
+            if k2 > 0:
+                longer = math.sqrt((math.sqrt(1 + 4 * k2 * longer**2) - 1) / (2 * k2))
+            if longer > way:
+                way, ahead = longer, 0.5 * longer
+        ways[level] = ahead, way / settings.time_step
+    return ways

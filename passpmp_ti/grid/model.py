@@ -8,10 +8,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from passpmp_ti import backend, door
+from passpmp_ti import backend, device, door
 from passpmp_ti.grid.arrival import arrival, rasterised
 from passpmp_ti.grid.body import Body, to_poses
 from passpmp_ti.grid.memory import check_previous
+from passpmp_ti.grid.spans import spans_of
 from passpmp_ti.grid.static_map import StaticMap
 from passpmp_ti.grid.view import Views, views_of
 from passpmp_ti.grid.window import Window, size_for
@@ -58,6 +59,15 @@ class FutureModel:
     broken_premises: np.ndarray
     """[n, 2] returns in space that the model before had proven free [m]."""
     _body: Body = field(repr=False)
+    counts: device.Array = field(init=False, repr=False)
+    """[15] int32 that the check's kernels read of the window and the robot."""
+    spans: device.Array = field(init=False, repr=False)
+    """[F] uint32: least and greatest ticks over blocks of cells, see kernels/spans.py."""
+
+    def __post_init__(self) -> None:
+        counts = device.put(self._body.placed(self.window.corner, self.window.size))
+        object.__setattr__(self, "counts", counts)
+        object.__setattr__(self, "spans", spans_of(self.ticks, counts, self.window.size))
 
     @classmethod
     def from_scan(
@@ -218,6 +228,7 @@ class FutureModel:
             check_states(
                 self._body.kind,
                 self.ticks,
+                self.spans,
                 self._body.numbers,
                 self.counts,
                 self._body.braking,
@@ -266,11 +277,6 @@ class FutureModel:
             horizon = 2 * self.settings.cycle + self.robot.longest_braking
             count = math.ceil(horizon / self.settings.layer_length)
         return np.stack([self.layer(index) for index in range(count)])
-
-    @property
-    def counts(self) -> np.ndarray:
-        """[8] int32 that the check kernels read of the window and the robot."""
-        return self._body.placed(self.window.corner, self.window.size)
 
     @property
     def body(self) -> Body:

@@ -7,6 +7,9 @@ Nodes are rows of flat arrays, parents before children, siblings side by side.
         that proves the node, 5 first child, 6 number of children, 7 what the node is
     cost [cap, 5] f32: 0 integral of the guide along the plan to the node, 1 guide at the node,
         2 integral along the braking that proves the node, 3 guide at its end, 4 its duration [s]
+
+A level is grown in chunks of parents, so that what is kept of the children between their check and
+their place in the tree stays small whatever the tree's size.
 """
 
 import taichi as ti
@@ -17,19 +20,34 @@ from passpmp_ti.kernels.check import (
     Numbers,
     Table,
     control_of,
+    free_steps,
     proving_brake,
     robot_of,
     way_clear,
 )
 from passpmp_ti.kernels.guide import guide_at
-from passpmp_ti.kernels.motion import C, S, X, Y, at_rest, heading_for, pose7, step
+from passpmp_ti.kernels.motion import (
+    CAR,
+    C,
+    S,
+    X,
+    Y,
+    at_rest,
+    braking_steps,
+    heading_for,
+    pose7,
+    setting_out,
+    speed_of,
+    step,
+)
+from passpmp_ti.kernels.spans import Spans
 
 GROWN, BRAKED = 0, 1
 """What a node is: the end of a primitive, or the rest that a braking trajectory leads to."""
 
 PARENT, CONTROL, STEPS, TICK, PROOF, FIRST, CHILDREN, WHAT = range(8)
-SAMPLES = 4  # of the guide along a primitive
-BRAKING_PACE = 5  # steps between samples of the guide along a braking
+SAMPLES = 2  # of the guide along a primitive, after its beginning
+BRAKING_SAMPLES = 4  # the same along a braking
 
 Links = ti.types.ndarray(dtype=ti.i32, ndim=2)
 
@@ -49,6 +67,11 @@ def store_pose(pose: ti.template(), n, q):
 
 
 @ti.func
+def cost_at(guide: ti.template(), ahead: ti.template(), guide_frame: ti.template(), q):
+    return guide_at(guide, ahead, guide_frame, q[X], q[Y], q[C], q[S])
+
+
+@ti.func
 def braking_cost(
     kind: ti.template(),
     guide: ti.template(),
@@ -57,171 +80,348 @@ def braking_cost(
     numbers: ti.template(),
     robot,
     start,
+    here,
     control,
 ):
-    """(integral of the guide along a braking, steps it takes, where it ends)."""
+    """(integral of the guide along a braking, guide where it ends, its duration [s]).
+
+    In a few long steps: costs need no more, and nothing is proven by them. `here`: guide at start.
+    """
+    seconds = (braking_steps(kind, start, control, numbers[1]) - 2) * numbers[1]
+    pace = seconds * (1.0 / BRAKING_SAMPLES)
     q = start
-    taken = 0
+    before = here
     spent = 0.0
-    while not at_rest(kind, q):
-        q = step(kind, robot, q, control, 0.0, numbers[1])
-        taken += 1
-        if taken % BRAKING_PACE == 0:
-            spent += guide_at(guide, ahead, guide_frame, q[X], q[Y], q[C], q[S]) * BRAKING_PACE
-    spent += guide_at(guide, ahead, guide_frame, q[X], q[Y], q[C], q[S]) * (taken % BRAKING_PACE)
-    return spent * numbers[1], taken, q
+    if seconds > 0.0:
+        for _ in range(BRAKING_SAMPLES):
+            for _half in range(2):
+                q = step(kind, robot, q, control, 0.0, 0.5 * pace)
+                if ti.static(kind != CAR):
+                    # a fast spin is more than the series of so long a step tells
+                    length = 1.0 / ti.max(ti.sqrt(q[C] * q[C] + q[S] * q[S]), 1e-3)
+                    q[C] *= length
+                    q[S] *= length
+            after = cost_at(guide, ahead, guide_frame, q)
+            spent += 0.5 * (before + after) * pace
+            before = after
+    return spent, before, seconds
+
+
+@ti.func
+def driven_clear(
+    kind: ti.template(),
+    arrival: ti.template(),
+    spans: ti.template(),
+    guide: ti.template(),
+    ahead: ti.template(),
+    guide_frame: ti.template(),
+    numbers: ti.template(),
+    counts: ti.template(),
+    robot,
+    start,
+    start_tick,
+    here,
+    control,
+    steps,
+):
+    """(whether a primitive from `start` touches nothing, its end, integral of the guide along it,
+    guide at its end). Waiting is not checked, leaving is."""
+    q = start
+    tick = start_tick
+    direction = heading_for(kind, q)
+    towards = setting_out(kind, q, control)
+    clear = True
+    resting = at_rest(kind, q)
+    free = 0
+    level = 2
+    spent = 0.0
+    before_cost = here
+    pace = ti.max((steps + SAMPLES - 1) // SAMPLES, 1)
+    since = 0
+    k = 0
+    while clear and k < steps:
+        if free == 0:
+            # no robot gains more in the time that is left
+            gain = ti.max(ti.abs(control[1]), ti.abs(control[2]))
+            if ti.static(kind == CAR):
+                gain = ti.abs(control[1])
+            left = steps - k
+            fastest = speed_of(kind, q) + gain * left * numbers[1]
+            # as a braking it would cover half of the way that it covers at one speed
+            free, level = free_steps(
+                spans, numbers, counts, q, ti.min(fastest, robot[0]), towards, tick, 2 * left, level
+            )
+        before = q
+        q = step(kind, robot, q, control, direction, numbers[1])
+        if free > 0:
+            free -= 1
+        else:
+            still = at_rest(kind, q)
+            if not (resting and still):
+                clear = way_clear(arrival, numbers, counts, before, q, tick)
+            free += 1
+        resting = at_rest(kind, q)
+        tick += counts[4]
+        k += 1
+        since += 1
+        if since == pace or k == steps:
+            after = cost_at(guide, ahead, guide_frame, q)
+            spent += 0.5 * (before_cost + after) * since * numbers[1]
+            before_cost = after
+            since = 0
+    return clear, q, spent, before_cost
+
+
+@ti.func
+def block_begin(b, blocks, first, last):
+    """First parent of a block."""
+    return first + ti.cast(ti.cast(b, ti.i64) * (last - first) // blocks, ti.i32)
+
+
+@ti.func
+def room_for(
+    kind: ti.template(), pose: ti.template(), link: ti.template(), child_proof: ti.template(),
+    parent, first, per_parent,
+):
+    """How many slots a parent's children take; -1: one, for the braking that its check proved."""
+    found = 0
+    for k in range(per_parent):
+        if child_proof[(parent - first) * per_parent + k] > 0:
+            found += 1
+    if found == 0 and link[parent, WHAT] == GROWN:
+        # no safe child: it brakes, if it moves
+        if link[parent, PROOF] >= 0 and not at_rest(kind, pose_of(pose, parent)):
+            found = -1
+    return found
 
 
 @ti.kernel
 def grow_level(
     # in
     kind: ti.template(),
+    share: ti.template(),  # indices that one thread is handed at a time, see device.share
+    grain: ti.template(),  # children that one thread checks in one go
     arrival: Arrival,  # [J, I]
+    spans: Spans,  # [F]
     guide: ti.types.ndarray(dtype=ti.f32, ndim=2),
     ahead: ti.types.ndarray(dtype=ti.f32, ndim=3),
     guide_frame: Numbers,  # [11]
-    numbers: Numbers,  # [18]
-    counts: Counts,  # [8]
+    numbers: Numbers,
+    counts: Counts,
     braking: Table,  # [B, 3]
     controls: Table,  # [U, 3]
-    first: ti.i32,  # nodes [first, last) are this level's parents
+    first: ti.i32,  # nodes [first, last) are this chunk's parents
     last: ti.i32,
+    slot: ti.i32,  # nodes in the tree so far
     steps: ti.i32,
     # in / out
     pose: Table,
     link: Links,
     cost: Table,
     # scratch
-    child_pose: Table,  # [M, 7]
+    child: Table,  # [M, 9] pose, integral of the guide, guide at the end
     child_proof: Counts,  # [M]: 1 + braking control, 0: not safe
-    child_cost: Table,  # [M, 2]
+    block: Counts,  # [blocks + 1] slots that blocks of parents take, then where they begin
     # out
-    grown: Counts,  # [2]: nodes in the tree now, parents that found no room
+    grown: Counts,  # [2]: nodes in the tree now, parents of this chunk that found no room
 ):
     per_parent = counts[7]
     capacity = pose.shape[0]
-    for m in range((last - first) * per_parent):
-        parent = first + m // per_parent
-        proof = 0
-        if link[parent, WHAT] == GROWN:
-            robot = robot_of(numbers)
-            q = pose_of(pose, parent)
-            tick = link[parent, TICK]
-            control = control_of(controls, m % per_parent)
-            direction = heading_for(kind, q)
-            clear = True
-            spent = 0.0
-            pace = ti.max(steps // SAMPLES, 1)
-            resting = at_rest(kind, q)
-            for k in range(steps):
-                if clear:
-                    before = q
-                    q = step(kind, robot, q, control, direction, numbers[1])
-                    still = at_rest(kind, q)
-                    # waiting is not checked, leaving is
-                    if not (resting and still):
-                        clear = way_clear(arrival, numbers, counts, before, q, tick)
-                    tick += counts[4]
-                    resting = still
-                    if (k + 1) % pace == 0 or k + 1 == steps:
-                        span = pace
-                        if (k + 1) % pace != 0:
-                            span = steps % pace
-                        spent += (
-                            guide_at(guide, ahead, guide_frame, q[X], q[Y], q[C], q[S])
-                            * span
-                            * numbers[1]
-                        )
-            if clear:
-                proof = proving_brake(kind, arrival, numbers, counts, braking, robot, q, tick)
-                store_pose(child_pose, m, q)
-                child_cost[m, 0] = cost[parent, 0] + spent
-                child_cost[m, 1] = guide_at(guide, ahead, guide_frame, q[X], q[Y], q[C], q[S])
-        child_proof[m] = proof
+    blocks = block.shape[0] - 1
+    children = (last - first) * per_parent
+    for index in range((children + grain - 1) // grain * share):
+        if index % share == 0:
+            begin = index // share * grain
+            for m in range(begin, ti.min(begin + grain, children)):
+                parent = first + m // per_parent
+                proof = 0
+                if link[parent, WHAT] == GROWN:
+                    robot = robot_of(numbers)
+                    tick = link[parent, TICK]
+                    clear, q, spent, there = driven_clear(
+                        kind, arrival, spans, guide, ahead, guide_frame, numbers, counts, robot,
+                        pose_of(pose, parent), tick, cost[parent, 1],
+                        control_of(controls, m % per_parent), steps,
+                    )  # fmt: skip
+                    if clear:
+                        proof = proving_brake(
+                            kind, arrival, spans, numbers, counts, braking, robot, q,
+                            tick + steps * counts[4],
+                        )  # fmt: skip
+                    if proof > 0:
+                        store_pose(child, m, q)
+                        child[m, 7] = cost[parent, 0] + spent
+                        child[m, 8] = there
+                child_proof[m] = proof
 
-    # Slots are given in order, by one thread: the same tree on every run.
+    # Slots go by the order of nodes, whoever counts them: the same tree on every run.
+    for index in range(blocks * share):
+        if index % share == 0:
+            b = index // share
+            end = block_begin(b + 1, blocks, first, last)
+            taken = 0
+            for parent in range(block_begin(b, blocks, first, last), end):
+                taken += ti.abs(room_for(kind, pose, link, child_proof, parent, first, per_parent))
+            block[b] = taken
     ti.loop_config(serialize=True)
     for _ in range(1):
-        slot = last
-        short = 0
-        for parent in range(first, last):
-            found = 0
-            for k in range(per_parent):
-                if child_proof[(parent - first) * per_parent + k] > 0:
-                    found += 1
-            if found == 0 and link[parent, WHAT] == GROWN:
-                # no safe child: the braking trajectory that its own check proved, if it moves
-                if link[parent, PROOF] >= 0 and not at_rest(kind, pose_of(pose, parent)):
-                    found = -1
-            room = ti.abs(found)
-            if slot + room > capacity:
-                short += 1
-                found = 0
-                room = 0
-            link[parent, FIRST] = slot
-            if found == 0:
-                link[parent, FIRST] = -1
-            link[parent, CHILDREN] = found
-            slot += room
-        grown[0] = slot
-        grown[1] = short
+        begin = slot
+        for b in range(blocks):
+            taken = block[b]
+            block[b] = begin
+            begin += taken
+        block[blocks] = begin
+        grown[0] = begin
+        grown[1] = 0
+        if begin > capacity:
+            # from the first parent that does not fit, none does
+            b = blocks - 1
+            while block[b] > capacity:
+                b -= 1
+            end = block[b]
+            parent = block_begin(b, blocks, first, last)
+            full = False
+            while not full:
+                room = ti.abs(room_for(kind, pose, link, child_proof, parent, first, per_parent))
+                if end + room > capacity:
+                    full = True
+                else:
+                    end += room
+                    parent += 1
+            grown[0] = end
+            grown[1] = last - parent
 
-    for parent in range(first, last):
-        slot = link[parent, FIRST]
-        if link[parent, CHILDREN] > 0:
-            for k in range(per_parent):
-                m = (parent - first) * per_parent + k
-                if child_proof[m] > 0:
-                    store_pose(pose, slot, pose_of(child_pose, m))
-                    link[slot, PARENT] = parent
-                    link[slot, CONTROL] = k
-                    link[slot, STEPS] = steps
-                    link[slot, TICK] = link[parent, TICK] + steps * counts[4]
-                    link[slot, PROOF] = child_proof[m] - 1
-                    link[slot, FIRST] = -1
-                    link[slot, CHILDREN] = 0
-                    link[slot, WHAT] = GROWN
-                    cost[slot, 0] = child_cost[m, 0]
-                    cost[slot, 1] = child_cost[m, 1]
-                    spent, taken, rest = braking_cost(
-                        kind,
-                        guide,
-                        ahead,
-                        guide_frame,
-                        numbers,
-                        robot_of(numbers),
-                        pose_of(pose, slot),
-                        control_of(braking, link[slot, PROOF]),
-                    )
-                    cost[slot, 2] = spent
-                    cost[slot, 3] = guide_at(
-                        guide, ahead, guide_frame, rest[X], rest[Y], rest[C], rest[S]
-                    )
-                    cost[slot, 4] = taken * numbers[1]
-                    slot += 1
-        elif link[parent, CHILDREN] < 0:
-            link[parent, CHILDREN] = 1
-            spent, taken, rest = braking_cost(
-                kind,
-                guide,
-                ahead,
-                guide_frame,
-                numbers,
-                robot_of(numbers),
-                pose_of(pose, parent),
-                control_of(braking, link[parent, PROOF]),
-            )
-            store_pose(pose, slot, rest)
-            link[slot, PARENT] = parent
-            link[slot, CONTROL] = link[parent, PROOF]
-            link[slot, STEPS] = taken
-            link[slot, TICK] = link[parent, TICK] + taken * counts[4]
-            link[slot, PROOF] = 0
-            link[slot, FIRST] = -1
-            link[slot, CHILDREN] = 0
-            link[slot, WHAT] = BRAKED
-            cost[slot, 0] = cost[parent, 0] + spent
-            cost[slot, 1] = guide_at(guide, ahead, guide_frame, rest[X], rest[Y], rest[C], rest[S])
-            cost[slot, 2] = 0.0
-            cost[slot, 3] = cost[slot, 1]
-            cost[slot, 4] = 0.0
+    for index in range(blocks * share):
+        if index % share == 0:
+            b = index // share
+            slot_now = block[b]
+            end = block_begin(b + 1, blocks, first, last)
+            for parent in range(block_begin(b, blocks, first, last), end):
+                found = room_for(kind, pose, link, child_proof, parent, first, per_parent)
+                room = ti.abs(found)
+                fits = found != 0 and slot_now + room <= capacity
+                link[parent, FIRST] = -1
+                link[parent, CHILDREN] = 0
+                if fits:
+                    link[parent, FIRST] = slot_now
+                    link[parent, CHILDREN] = room
+                if fits and found > 0:
+                    at = slot_now
+                    for k in range(per_parent):
+                        m = (parent - first) * per_parent + k
+                        if child_proof[m] > 0:
+                            q = pose_of(child, m)
+                            there = child[m, 8]
+                            store_pose(pose, at, q)
+                            link[at, PARENT] = parent
+                            link[at, CONTROL] = k
+                            link[at, STEPS] = steps
+                            link[at, TICK] = link[parent, TICK] + steps * counts[4]
+                            link[at, PROOF] = child_proof[m] - 1
+                            link[at, FIRST] = -1
+                            link[at, CHILDREN] = 0
+                            link[at, WHAT] = GROWN
+                            spent, end_cost, seconds = braking_cost(
+                                kind, guide, ahead, guide_frame, numbers, robot_of(numbers), q,
+                                there, control_of(braking, child_proof[m] - 1),
+                            )  # fmt: skip
+                            cost[at, 0] = child[m, 7]
+                            cost[at, 1] = there
+                            cost[at, 2] = spent
+                            cost[at, 3] = end_cost
+                            cost[at, 4] = seconds
+                            at += 1
+                elif fits:
+                    store_braking(
+                        kind, guide, ahead, guide_frame, numbers, counts, braking, parent, slot_now,
+                        pose, link, cost,
+                    )  # fmt: skip
+                slot_now += room
+
+
+@ti.func
+def store_braking(
+    kind: ti.template(),
+    guide: ti.template(),
+    ahead: ti.template(),
+    guide_frame: ti.template(),
+    numbers: ti.template(),
+    counts: ti.template(),
+    braking: ti.template(),
+    parent,
+    at,
+    pose: ti.template(),
+    link: ti.template(),
+    cost: ti.template(),
+):
+    """Put the rest that a parent's own braking leads to into slot `at`, its only child."""
+    start = pose_of(pose, parent)
+    control = control_of(braking, link[parent, PROOF])
+    robot = robot_of(numbers)
+    q = start
+    taken = 0
+    while not at_rest(kind, q):
+        q = step(kind, robot, q, control, 0.0, numbers[1])
+        taken += 1
+    store_pose(pose, at, q)
+    spent, _, _ = braking_cost(
+        kind, guide, ahead, guide_frame, numbers, robot, start, cost[parent, 1], control
+    )
+    there = cost_at(guide, ahead, guide_frame, q)
+    link[at, PARENT] = parent
+    link[at, CONTROL] = link[parent, PROOF]
+    link[at, STEPS] = taken
+    link[at, TICK] = link[parent, TICK] + taken * counts[4]
+    link[at, PROOF] = 0
+    link[at, FIRST] = -1
+    link[at, CHILDREN] = 0
+    link[at, WHAT] = BRAKED
+    cost[at, 0] = cost[parent, 0] + spent
+    cost[at, 1] = there
+    cost[at, 2] = 0.0
+    cost[at, 3] = there
+    cost[at, 4] = 0.0
+
+
+@ti.kernel
+def trail(
+    # in
+    link: Links,  # [cap, 8]
+    node: ti.i32,
+    # out
+    rows: Links,  # [D, 9] node and its link, from `node` up to the root
+) -> ti.i32:
+    """How many rows were written: what of a tree on a device has to be known of one plan."""
+    count = 0
+    ti.loop_config(serialize=True)
+    for _ in range(1):
+        at = node
+        while at >= 0 and count < rows.shape[0]:
+            rows[count, 0] = at
+            for r in ti.static(range(8)):
+                rows[count, 1 + r] = link[at, r]
+            count += 1
+            at = link[at, PARENT]
+    return count
+
+
+@ti.kernel
+def plant(
+    # in
+    root_pose: Numbers,  # [7]
+    root_link: Counts,  # [8]
+    root_cost: Numbers,  # [5]
+    # out
+    pose: Table,
+    link: Links,
+    cost: Table,
+):
+    """Write the root into a tree on a device."""
+    ti.loop_config(serialize=True)
+    for _ in range(1):
+        for r in ti.static(range(7)):
+            pose[0, r] = root_pose[r]
+        for r in ti.static(range(8)):
+            link[0, r] = root_link[r]
+        for r in ti.static(range(5)):
+            cost[0, r] = root_cost[r]

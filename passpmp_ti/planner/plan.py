@@ -7,7 +7,7 @@ import numpy as np
 from passpmp_ti.grid.body import to_poses, to_states
 from passpmp_ti.grid.model import FutureModel
 from passpmp_ti.kernels.tree import PROOF
-from passpmp_ti.planner.tree import ROOT, Tree, follow
+from passpmp_ti.planner.tree import Tree, follow
 from passpmp_ti.trajectory import Trajectory
 
 
@@ -15,8 +15,8 @@ def trajectory_to(tree: Tree, leaf: int) -> Trajectory:
     """The plan that ends at `leaf`, then the braking trajectory that proved the leaf p-safe."""
     parts = tree.controls_to(leaf)
     planned = sum(steps for _, steps in parts)
-    tail = tree.model.body.braking[max(int(tree.link[leaf, PROOF]), 0)]
-    return _as_trajectory(tree.model, tree.pose[ROOT], [*parts, (tail, -1)], tree.start, planned)
+    tail = tree.model.body.braking[max(int(tree.trail(leaf)[-1, 1 + PROOF]), 0)]
+    return _as_trajectory(tree.model, tree.root, [*parts, (tail, -1)], tree.start, planned)
 
 
 def braking_from(model: FutureModel, state: np.ndarray, start: float, control: int) -> Trajectory:

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from passpmp_ti import device
 from passpmp_ti.grid.body import to_poses, to_states
 from passpmp_ti.grid.model import TICK, FutureModel
 from passpmp_ti.kernels.check import trace
@@ -19,6 +20,8 @@ from passpmp_ti.kernels.tree import (
     STEPS,
     WHAT,
     grow_level,
+    plant,
+    trail,
 )
 from passpmp_ti.kernels.tree import TICK as TICK_COLUMN
 from passpmp_ti.planner.guide import GuideField
@@ -29,27 +32,50 @@ ROOT = 0
 NO_PARENT = -1
 
 
+CHUNK = 1 << 16
+"""Most children that are checked in one launch: what is kept of them fits the processor's cache."""
+GRAIN, BLOCKS = 16, 16
+"""Children that a thread of a CPU checks in one go, and blocks of parents that are given their
+slots side by side."""
+DEVICE_CHUNK, DEVICE_BLOCKS = 1 << 20, 1024
+"""The same on a device, where each thread checks one child."""
+DEEPEST = 64
+"""Levels that a plan is read back from."""
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Tree:
-    """Nodes as rows of flat arrays, parents before children, siblings side by side."""
+    """Nodes as rows of flat arrays, parents before children, siblings side by side.
+
+    The arrays lie where the kernels run. On a device they have room for more nodes than there are,
+    and NumPy reads them by `on_host`.
+    """
 
     model: FutureModel
-    pose: np.ndarray
+    pose: device.Array
     """[n, 7] float32, on the device's anchor."""
-    link: np.ndarray
+    link: device.Array
     """[n, 8] int32, see kernels/tree.py."""
-    cost: np.ndarray
+    cost: device.Array
     """[n, 5] float32: the guide along the plan, at the node, and along its braking; see there."""
+    root: np.ndarray
+    """[7] float32 pose of the root."""
+    count: int
+    """Nodes, the root among them."""
     start: float
     """Absolute time of the root, t_{k+1} [s]."""
     depth: int
     stopped_by: str
     """"depth", "capacity", "time" or "unsafe"."""
 
-    @property
-    def count(self) -> int:
-        """Nodes, the root among them."""
-        return len(self.pose)
+    def on_host(self) -> Tree:
+        """The same tree in NumPy's arrays; on the CPU it is one."""
+        if isinstance(self.link, np.ndarray):
+            return self
+        pose, link, cost = (
+            device.host(a)[: self.count] for a in (self.pose, self.link, self.cost)
+        )
+        return replace(self, pose=pose, link=link, cost=cost)
 
     @property
     def states(self) -> np.ndarray:
@@ -81,24 +107,25 @@ class Tree:
         """[m] indices of the nodes without children."""
         return np.flatnonzero(self.link[:, CHILDREN] == 0)
 
+    def trail(self, node: int) -> np.ndarray:
+        """[m, 9] int32: the nodes from the root to `node`, each with its row of `link`."""
+        rows = device.empty((DEEPEST, 9), np.int32)
+        count = trail(self.link, int(node), rows)
+        return device.host(rows)[:count][::-1]
+
     def lineage(self, node: int) -> list[int]:
         """Nodes from the root to `node` (Traj_IDs of Algorithm 1)."""
-        nodes = [int(node)]
-        while nodes[-1] != ROOT:
-            nodes.append(int(self.link[nodes[-1], PARENT]))
-        return nodes[::-1]
+        return [int(n) for n in self.trail(node)[:, 0]]
 
     def controls_to(self, node: int) -> list[tuple[np.ndarray, int]]:
         """(control, steps) of each primitive from the root to `node`."""
         body = self.model.body
         return [
             (
-                (body.braking if self.link[n, WHAT] == BRAKED else body.controls)[
-                    self.link[n, CONTROL]
-                ],
-                int(self.link[n, STEPS]),
+                (body.braking if row[1 + WHAT] == BRAKED else body.controls)[row[1 + CONTROL]],
+                int(row[1 + STEPS]),
             )
-            for n in self.lineage(node)[1:]
+            for row in self.trail(node)[1:]
         ]
 
     def primitive(self, node: int) -> np.ndarray:
@@ -111,7 +138,7 @@ class Tree:
 
     def path(self, node: int) -> np.ndarray:
         """[m, 2] world points of the plan that leads to `node`."""
-        path = follow(self.model, self.pose[ROOT], self.controls_to(node))
+        path = follow(self.model, self.root, self.controls_to(node))
         return to_states(path, self.model.window.anchor)[:, :2]
 
     @property
@@ -168,22 +195,24 @@ def follow(model: FutureModel, pose: np.ndarray, parts: list[tuple[np.ndarray, i
 
 
 class TreeGrower:
-    """Owns the arrays that trees are grown in; they live as long as the planner."""
+    """Grows trees; owns what is kept of children between their check and their place in a tree."""
 
     def __init__(self, robot: Robot, settings: Settings) -> None:
         self._settings = settings
-        capacity, fan = settings.capacity, len(robot.controls)
-        # the last level that can still be grown has at most capacity / 2 parents of fan children
-        most = capacity * fan
-        self._pose = np.zeros((capacity, 7), dtype=np.float32)
-        self._link = np.zeros((capacity, 8), dtype=np.int32)
-        self._cost = np.zeros((capacity, 5), dtype=np.float32)
-        self._child_pose = np.zeros((most, 7), dtype=np.float32)
-        self._child_proof = np.zeros(most, dtype=np.int32)
-        self._child_cost = np.zeros((most, 2), dtype=np.float32)
+        fan = len(robot.controls)
+        # never less than one parent's, nor more than the largest level could need
+        resident = device.resident()
+        self._chunk = max(1, min(settings.capacity, (DEVICE_CHUNK if resident else CHUNK) // fan))
+        self._blocks = DEVICE_BLOCKS if resident else BLOCKS
+        self._grain = 1 if resident else GRAIN
+        self._child = device.empty((self._chunk * fan, 9), np.float32)
+        self._child_proof = device.empty((self._chunk * fan,), np.int32)
+        self._block = device.empty((self._blocks + 1,), np.int32)
+        self._grown = device.empty((2,), np.int32)
 
     def grow(
-        self, model: FutureModel, guide: GuideField, root: np.ndarray, start: float, proof: int
+        self, model: FutureModel, guide: GuideField, root: np.ndarray, start: float, proof: int,
+        *, until: float | None = None,
     ) -> Tree:
         """Grow a tree from `root`, level by level, until depth, capacity or time ends it.
 
@@ -193,40 +222,77 @@ class TreeGrower:
             root: [5] state s_{k+1}.
             start: t_{k+1}, absolute [s].
             proof: index of a braking control that proves the root; -1: none known.
+            until: on `time.perf_counter`'s clock [s]; no chunk of parents is begun that would
+                probably end later. None: no deadline.
         """
         settings, body = self._settings, model.body
         began = time.perf_counter()
-        self._pose[0] = to_poses(root[None], model.window.anchor)[0]
-        self._link[0] = (NO_PARENT, 0, 0, model.ticks_of(start), proof, -1, 0, 0)
+        if settings.exploration_time is not None:
+            budget = began + settings.exploration_time
+            until = budget if until is None else min(until, budget)
         here = guide.at(root[None])[0]
-        self._cost[0] = (0.0, here, 0.0, here, 0.0)
-        counts = model.counts
-        grown = np.zeros(2, dtype=np.int32)
-        first, last, depth, stopped_by = 0, 1, 0, "depth"
-        for steps in settings.levels:
-            budget = settings.exploration_time
-            if budget is not None and time.perf_counter() - began > budget:
-                stopped_by = "time"
-                break
-            grow_level(
-                body.kind, model.ticks, guide.time, guide.ahead, guide.frame, body.numbers, counts,
-                body.braking, body.controls, first, last, steps, self._pose, self._link,
-                self._cost, self._child_pose, self._child_proof, self._child_cost, grown,
-            )  # fmt: skip
-            first, last = last, int(grown[0])
-            if last == first:
-                stopped_by = "capacity" if grown[1] else "unsafe"
-                break
-            depth += 1
-            if grown[1]:
-                stopped_by = "capacity"
-                break
-        return Tree(
-            model,
-            self._pose[:last].copy(),
-            self._link[:last].copy(),
-            self._cost[:last].copy(),
-            start,
-            depth,
-            stopped_by,
+        root_pose = to_poses(root[None], model.window.anchor)[0]
+        arrays = _rooted(
+            settings.capacity,
+            root_pose,
+            np.array([NO_PARENT, 0, 0, model.ticks_of(start), proof, -1, 0, 0], dtype=np.int32),
+            np.array([0.0, here, 0.0, here, 0.0], dtype=np.float32),
         )
+        fixed = (
+            body.kind, device.share(), self._grain, model.ticks, model.spans, guide.time,
+            guide.ahead, guide.frame, body.numbers, model.counts, body.braking, body.controls,
+        )  # fmt: skip
+        level_begin, count, depth, stopped_by = ROOT, 1, 0, "depth"
+        pace = 0.0
+        for steps in settings.levels:
+            first, level_end, short = level_begin, count, 0
+            while first < level_end and not short:
+                now = time.perf_counter()
+                parents = min(self._chunk, level_end - first)
+                if until is not None:
+                    parents = _in_time(parents, until - now, pace)
+                    if not parents:
+                        stopped_by = "time"
+                        break
+                grow_level(
+                    *fixed, first, first + parents, count, steps, *arrays,
+                    self._child, self._child_proof, self._block, self._grown,
+                )  # fmt: skip
+                count, short = (int(n) for n in device.host(self._grown))
+                first += parents
+                pace = max(0.5 * pace, (time.perf_counter() - now) / parents)
+            depth += count > level_end
+            if short:
+                stopped_by = "capacity"
+            elif count == level_end and stopped_by == "depth":
+                stopped_by = "unsafe"
+            if stopped_by != "depth":
+                break
+            level_begin = level_end
+        if not device.resident():
+            arrays = tuple(array[:count] for array in arrays)
+        return Tree(model, *arrays, root_pose, count, start, depth, stopped_by)
+
+
+def _in_time(parents: int, left: float, pace: float) -> int:
+    """How many of some parents can be grown in the time left [s], at `pace` seconds each; 0: none.
+
+    A third of the time is kept back, for what takes longer than the last ones did.
+    """
+    if left <= 0:
+        return 0
+    return parents if pace == 0.0 else min(parents, int(left / (1.5 * pace)))
+
+
+def _rooted(
+    capacity: int, pose: np.ndarray, link: np.ndarray, cost: np.ndarray
+) -> tuple[device.Array, device.Array, device.Array]:
+    """Arrays of `capacity` nodes whose first is the root. Memory that no node comes to use costs
+    nothing on the CPU: it is never touched."""
+    arrays = tuple(device.empty((capacity, len(row)), row.dtype) for row in (pose, link, cost))
+    if device.resident():
+        plant(pose, link, cost, *arrays)
+    else:
+        for array, row in zip(arrays, (pose, link, cost), strict=True):
+            array[ROOT] = row
+    return arrays

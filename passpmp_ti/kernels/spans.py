@@ -1,0 +1,139 @@
+"""From when to when places come to be reached: least and greatest arrival over blocks of cells.
+
+Level k holds, for each block of (2 << k) x (2 << k) cells, the least and the greatest arrival time
+of the block and its eight neighbours. Every cell that a disc of the block's side about any point of
+the block touches is among them. So one look-up speaks for a disc: until its least time all of it is
+free, from its greatest on none of it is. Both may say less than is true, never more.
+
+    counts i32: 0 i0, 1 j0 (cell of the map's corner), 2 columns, 3 rows, 8- where each level begins
+    spans u32 [F]: least time in the lower half of the bits, greatest in the upper half
+"""
+
+import taichi as ti
+
+LEVELS = 7
+BEGIN = 8
+"""Where the levels' offsets begin in `counts`."""
+TILE = 2 << (LEVELS - 1)
+ROUNDING = 3e-3
+"""[m] by which sums of f32 ways may be short."""
+
+Spans = ti.types.ndarray(dtype=ti.u32, ndim=1)
+Counts = ti.types.ndarray(dtype=ti.i32, ndim=1)
+
+
+@ti.func
+def blocks_along(cells, level):
+    """How many blocks of a level a row of cells takes."""
+    return (cells + (2 << level) - 1) >> (level + 1)
+
+
+@ti.func
+def level_for(radius, scale):
+    """The finest level whose look-ups speak for a disc of `radius`; LEVELS and more: none does.
+
+    A block's side must be no less than the radius: its exponent as a float gives the power of two.
+    """
+    blocks = ti.max((radius + ROUNDING) * scale * 0.5, 0.5)
+    return (ti.bit_cast(ti.cast(blocks, ti.f32), ti.i32) >> 23) - 126
+
+
+@ti.func
+def span_about(spans: ti.template(), counts: ti.template(), scale, x, y, level):
+    """(ticks until which all of a level's disc about (x, y) is free, ticks from which none of it
+    is). Beyond the map nothing is ever free; what of a disc lies on the map lies as near to the
+    map's nearest point."""
+    i = ti.cast(ti.floor(x * scale), ti.i32) - counts[0]
+    j = ti.cast(ti.floor(y * scale), ti.i32) - counts[1]
+    on_i = ti.min(ti.max(i, 0), counts[2] - 1)
+    on_j = ti.min(ti.max(j, 0), counts[3] - 1)
+    at = counts[BEGIN + level]
+    at += (on_j >> (level + 1)) * blocks_along(counts[2], level) + (on_i >> (level + 1))
+    both = spans[at]
+    least = ti.cast(both & ti.u32(65535), ti.i32)
+    if i != on_i or j != on_j:
+        least = 0
+    return least, ti.cast(both >> ti.u32(16), ti.i32)
+
+
+@ti.func
+def packed(least, greatest):
+    return ti.cast(least, ti.u32) | (ti.cast(greatest, ti.u32) << ti.u32(16))
+
+
+@ti.kernel
+def lay_spans(
+    # in
+    arrival: ti.types.ndarray(dtype=ti.u16, ndim=2),  # [J, I]
+    counts: Counts,
+    # scratch
+    pooled: Spans,  # [F] the same without the neighbours
+    # out
+    spans: Spans,  # [F]
+):
+    # A tile holds whole blocks of every level, so one thread pools all of its levels.
+    across = (counts[2] + TILE - 1) // TILE
+    for tile in range(across * ((counts[3] + TILE - 1) // TILE)):
+        j0 = (tile // across) * TILE
+        i0 = (tile % across) * TILE
+        columns = blocks_along(counts[2], 0)
+        for row in range(j0 >> 1, ti.min((j0 + TILE) >> 1, blocks_along(counts[3], 0))):
+            for column in range(i0 >> 1, ti.min((i0 + TILE) >> 1, columns)):
+                least = 65535
+                greatest = 0
+                for dj in ti.static(range(2)):
+                    for di in ti.static(range(2)):
+                        # beyond the map nothing is ever free
+                        found = 0
+                        if 2 * row + dj < counts[3] and 2 * column + di < counts[2]:
+                            found = ti.cast(arrival[2 * row + dj, 2 * column + di], ti.i32)
+                        least = ti.min(least, found)
+                        greatest = ti.max(greatest, found)
+                pooled[counts[BEGIN] + row * columns + column] = packed(least, greatest)
+        for level in range(1, LEVELS):
+            wide = blocks_along(counts[2], level)
+            below = blocks_along(counts[2], level - 1)
+            below_rows = blocks_along(counts[3], level - 1)
+            shift = level + 1
+            rows_end = ti.min((j0 + TILE) >> shift, blocks_along(counts[3], level))
+            columns_end = ti.min((i0 + TILE) >> shift, wide)
+            for row in range(j0 >> shift, rows_end):
+                for column in range(i0 >> shift, columns_end):
+                    least = 65535
+                    greatest = 0
+                    for dj in ti.static(range(2)):
+                        for di in ti.static(range(2)):
+                            j = 2 * row + dj
+                            i = 2 * column + di
+                            both = ti.u32(0)
+                            if j < below_rows and i < below:
+                                both = pooled[counts[BEGIN + level - 1] + j * below + i]
+                            least = ti.min(least, ti.cast(both & ti.u32(65535), ti.i32))
+                            greatest = ti.max(greatest, ti.cast(both >> ti.u32(16), ti.i32))
+                    pooled[counts[BEGIN + level] + row * wide + column] = packed(least, greatest)
+
+    rows_of_all = 0
+    for level in ti.static(range(LEVELS)):
+        rows_of_all += blocks_along(counts[3], level)
+    for line in range(rows_of_all):
+        level = 0
+        row = line
+        while row >= blocks_along(counts[3], level):
+            row -= blocks_along(counts[3], level)
+            level += 1
+        wide = blocks_along(counts[2], level)
+        rows = blocks_along(counts[3], level)
+        begin = counts[BEGIN + level]
+        for column in range(wide):
+            least = 65535
+            greatest = 0
+            for dj in ti.static(range(-1, 2)):
+                for di in ti.static(range(-1, 2)):
+                    j = row + dj
+                    i = column + di
+                    both = ti.u32(0)
+                    if j >= 0 and i >= 0 and j < rows and i < wide:
+                        both = pooled[begin + j * wide + i]
+                    least = ti.min(least, ti.cast(both & ti.u32(65535), ti.i32))
+                    greatest = ti.max(greatest, ti.cast(both >> ti.u32(16), ti.i32))
+            spans[begin + row * wide + column] = packed(least, greatest)
