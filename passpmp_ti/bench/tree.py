@@ -1,0 +1,141 @@
+"""Growing trees of primitives: nodes a second, from a hundred nodes to ten million."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from types import ModuleType
+
+import numpy as np
+
+from passpmp_ti import FutureModel
+from passpmp_ti.bench import reference, rivals
+from passpmp_ti.bench.found import Found, Options
+from passpmp_ti.bench.machine import has_avx512
+from passpmp_ti.bench.rounds import interleaved
+from passpmp_ti.bench.scenes import Scene, car_scene
+from passpmp_ti.planner.guide import Guide
+from passpmp_ti.planner.tree import Tree, TreeGrower
+
+SIZES = (100, 1_000, 10_000, 100_000, 1_000_000, 10_000_000)
+QUICK_SIZES = SIZES[:4]
+MOST_FOR_NUMPY = 10_000
+ROOT = np.array([0.0, 0.0, 0.0, 8.0, 0.0])
+"""(x, y, theta, v, xi) of the car, at the scan."""
+STEP = 0.05
+"""Of the others [s]."""
+DEEPEST = 12
+"""Most levels of our tree."""
+LARGE = 1_000_000
+"""From so many nodes on the primitives are shorter, so that the tree stays in the ring."""
+BUDGET, QUICK_BUDGET = 20.0, 4.0
+"""For all rounds of one capacity [s]."""
+
+
+def duration(size: int) -> float:
+    """Of a primitive of a tree of `size` nodes [s]."""
+    return 0.4 if size >= LARGE else 0.6
+
+
+def measure(options: Options) -> Found:
+    """Grow trees of each size in the ring."""
+    limit, compiled = rivals.limit(options), rivals.numba_module("compiled", options)
+    scene = car_scene("ring")
+    found = Found(
+        title="trees of nine controls in the ring, thousands of nodes a second",
+        rows=[],
+        ratios={},
+        notes=[
+            f"ours {STEP:g} s: at the time step of all others; ours: at the robot's own. Ours also"
+            " works out what each node costs, and brakes where no child is safe",
+            *rivals.missing(options),
+        ],
+    )
+    clearance = scene.settings.changed(time_step=STEP).clearance(scene.robot)
+    arrival = reference.arrival_seconds(
+        scene.scan(), scene.size, scene.cell, clearance, scene.settings.object_speed
+    )
+    controls = np.array([c[1:] for c in scene.robot.controls], dtype=np.float32)
+    at_step, own = f"ours {STEP:g} s", rivals.OURS
+    for size in options.sizes or (QUICK_SIZES if options.quick else SIZES):
+        options.see(f"tree: {size:,} nodes")
+        racing: dict[str, Callable[[], object]] = {
+            at_step: _ours(scene, size, STEP),
+            own: _ours(scene, size, scene.settings.time_step),
+        }
+        if limit is not None and has_avx512():
+            racing[rivals.CPP] = limit.tree(
+                scene, arrival, ROOT, controls, duration(size), size, STEP
+            )
+        for name, loops in ((rivals.NUMBA, compiled), (rivals.NUMPY, reference)):
+            if loops is not None and (name == rivals.NUMBA or size <= MOST_FOR_NUMPY):
+                racing[name] = _others(loops, scene, arrival, controls, size)
+        counts = {name: _count(rival()) for name, rival in racing.items()}
+        rounds = interleaved(racing, QUICK_BUDGET if options.quick else BUDGET)
+        row: dict[str, object] = {"capacity": size}
+        row |= {f"{name} [k/s]": 1e-3 * counts[name] / rounds.median(name) for name in racing}
+        row["nodes"] = counts[own]
+        found.rows.append(row)
+        for ours in (at_step, own):
+            for name in racing:
+                if name not in (at_step, own):
+                    # trees differ a little in their size: what counts is nodes a second
+                    found.ratios[f"{size:.0e}: {ours} / {name}"] = (
+                        rounds.faster(ours, name) * counts[ours] / counts[name]
+                    )
+    return found
+
+
+def _count(grown: object) -> int:
+    if isinstance(grown, Tree):
+        return grown.count
+    return int(grown[0]) if isinstance(grown, tuple) else int(str(grown))
+
+
+def _ours(scene: Scene, size: int, step: float) -> Callable[[], Tree]:
+    settings = scene.settings.changed(
+        time_step=step, capacity=size, cycle=duration(size),
+        primitives=(duration(size),) * (DEEPEST - 1), guide="euclidean",
+    )  # fmt: skip
+    model = FutureModel.from_scan(scene.scan(), scene.robot, settings)
+    goal = (0.5 * scene.range_max, 0.0)
+    guide = Guide(
+        scene.robot, settings, (0.0, 0.0), [goal], model.window.anchor, model.window.inner_radius,
+        None,
+    ).field(model, goal, np.zeros(2))  # fmt: skip
+    proof = int(model.proving_brakes(ROOT[None], np.array([model.stamp]))[0])
+    grower = TreeGrower(scene.robot, settings)
+    return lambda: grower.grow(model, guide, ROOT, model.stamp, proof)
+
+
+def _others(
+    loops: ModuleType, scene: Scene, arrival: np.ndarray, controls: np.ndarray, size: int
+) -> Callable[[], tuple[int, int]]:
+    ticks, steps = reference.ticks_of(arrival), round(duration(size) / STEP)
+    return lambda: grown(loops, ticks, scene.cell, controls, steps, size)
+
+
+def grown(
+    loops: ModuleType, ticks: np.ndarray, cell: float, controls: np.ndarray, steps: int, size: int
+) -> tuple[int, int]:
+    """(nodes, children checked) of a tree that is grown level by level by plain loops.
+
+    Args:
+        loops: `reference`, or `compiled`.
+        ticks: [J, I] uint16 map of arrivals [ms].
+        cell: [m]
+        controls: [u, 2] float32 acceleration and steering rate.
+        steps: of a primitive.
+        size: most nodes.
+    """
+    nodes = np.zeros((size, 6), dtype=np.float32)
+    parent = np.full(size, -1, dtype=np.int32)
+    nodes[0, :5] = ROOT
+    first, last, checked = 0, 1, 0
+    while first < last < size:
+        ends, safe = loops.children(ticks, cell, nodes[first:last], controls, steps, STEP)
+        checked += len(safe)
+        kept = np.flatnonzero(safe)[: size - last]
+        nodes[last : last + len(kept)] = ends[kept]
+        parent[last : last + len(kept)] = first + kept // len(controls)
+        first, last = last, last + len(kept)
+    return last, checked
