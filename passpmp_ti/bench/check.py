@@ -37,8 +37,8 @@ def measure(options: Options) -> Found:
         ratios={},
         notes=[
             f"ours {STEP:g} s: at the time step of all others; ours: at the robot's own",
-            "differ: verdicts that are not those of the C++ (of NumPy where there is none), whose"
-            " map is cut into coarse layers",
+            "safe: what ours calls safe; theirs: what the C++ does (NumPy where there is none),"
+            " whose map is cut into coarse layers; differ: where the two do",
             f"unsound: called safe, and touched when looked at every {1e3 * FINE_STEP:g} ms on the"
             " map of the body alone, without a margin: must be 0",
             *rivals.missing(options),
@@ -86,8 +86,10 @@ def _measure_one(
     safe = verdicts()[: len(judged)]
     if theirs is None:
         theirs = reference.passively_safe(ticks, scene.cell, judged, STEP)
+    theirs = theirs[: len(judged)]
     row["safe [%]"] = 100 * float(safe.mean())
-    row["differ [%]"] = 100 * float((safe != theirs[: len(judged)]).mean())
+    row["theirs [%]"] = 100 * float(theirs.mean())
+    row["differ [%]"] = 100 * float((safe != theirs).mean())
     row["unsound"] = int((safe & ~truly_safe(scene, judged, limit)).sum())
     found.rows.append(row)
     for ours in (at_step, own):

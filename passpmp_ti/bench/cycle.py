@@ -26,7 +26,7 @@ WARM_UP = 5
 
 
 QUICK_CYCLES = 100
-LONG = (0.5, 0.5, 0.5, 0.5, 0.5)
+LONG = (0.4,) * 7
 """Primitives that make a tree of ten thousand nodes [s]."""
 YARDSTICK_EVERY = 25
 """Cycles between two looks at how fast the machine is just now."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 import os
 import platform
 import subprocess
@@ -25,6 +26,7 @@ def machine() -> dict[str, Any]:
         "system": f"{platform.system()} {platform.release()}",
         "python": sys.version.split()[0],
         **{name: metadata.version(name) for name in ("taichi", "numpy", "scipy")},
+        **({"numba": metadata.version("numba")} if importlib.util.find_spec("numba") else {}),
     }
 
 

@@ -112,6 +112,16 @@ def _bytes(array: object) -> int:
     return int(np.prod(array.shape)) * np.dtype(ti.lang.util.to_numpy_type(array.dtype)).itemsize
 
 
+def available() -> int:
+    """Bytes of memory that are free for use; 0 where the system does not tell."""
+    listing = Path("/proc/meminfo")
+    if listing.is_file():
+        for line in listing.read_text().splitlines():
+            if line.startswith("MemAvailable:"):
+                return 1024 * int(line.split()[1])
+    return 0
+
+
 def resident_set() -> int:
     """Bytes of this process that lie in memory; 0 where the system does not tell."""
     statm = Path("/proc/self/statm")

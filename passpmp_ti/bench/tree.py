@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from types import ModuleType
 
 import numpy as np
@@ -11,10 +12,11 @@ from passpmp_ti import FutureModel
 from passpmp_ti.bench import reference, rivals
 from passpmp_ti.bench.found import Found, Options
 from passpmp_ti.bench.machine import has_avx512
+from passpmp_ti.bench.memory import available, held
 from passpmp_ti.bench.rounds import interleaved
 from passpmp_ti.bench.scenes import Scene, car_scene
 from passpmp_ti.planner.guide import Guide
-from passpmp_ti.planner.tree import Tree, TreeGrower
+from passpmp_ti.planner.tree import TreeGrower
 
 SIZES = (100, 1_000, 10_000, 100_000, 1_000_000, 10_000_000)
 QUICK_SIZES = SIZES[:4]
@@ -27,6 +29,8 @@ DEEPEST = 12
 """Most levels of our tree."""
 LARGE = 1_000_000
 """From so many nodes on the primitives are shorter, so that the tree stays in the ring."""
+MOST_OF_MEMORY = 0.7
+"""Share of what is free that the trees of one size may take."""
 BUDGET, QUICK_BUDGET = 20.0, 4.0
 """For all rounds of one capacity [s]."""
 
@@ -57,8 +61,12 @@ def measure(options: Options) -> Found:
     controls = np.array([c[1:] for c in scene.robot.controls], dtype=np.float32)
     at_step, own = f"ours {STEP:g} s", rivals.OURS
     for size in options.sizes or (QUICK_SIZES if options.quick else SIZES):
+        room = available()
+        if room and _needed(scene, size) > MOST_OF_MEMORY * room:
+            found.notes.insert(0, f"{size:,} nodes do not fit into {room / 2**30:.1f} GiB")
+            continue
         options.see(f"tree: {size:,} nodes")
-        racing: dict[str, Callable[[], object]] = {
+        racing: dict[str, Callable[[], int]] = {
             at_step: _ours(scene, size, STEP),
             own: _ours(scene, size, scene.settings.time_step),
         }
@@ -69,29 +77,36 @@ def measure(options: Options) -> Found:
         for name, loops in ((rivals.NUMBA, compiled), (rivals.NUMPY, reference)):
             if loops is not None and (name == rivals.NUMBA or size <= MOST_FOR_NUMPY):
                 racing[name] = _others(loops, scene, arrival, controls, size)
-        counts = {name: _count(rival()) for name, rival in racing.items()}
-        rounds = interleaved(racing, QUICK_BUDGET if options.quick else BUDGET)
+        nodes: dict[str, int] = {}
+
+        def counted(name: str, grow: Callable[[], int], nodes: dict[str, int] = nodes) -> None:
+            nodes[name] = grow()
+
+        rounds = interleaved(
+            {name: partial(counted, name, grow) for name, grow in racing.items()},
+            QUICK_BUDGET if options.quick else BUDGET,
+        )
         row: dict[str, object] = {"capacity": size}
-        row |= {f"{name} [k/s]": 1e-3 * counts[name] / rounds.median(name) for name in racing}
-        row["nodes"] = counts[own]
+        row |= {f"{name} [k/s]": 1e-3 * nodes[name] / rounds.median(name) for name in racing}
+        row["nodes"] = nodes[own]
         found.rows.append(row)
         for ours in (at_step, own):
             for name in racing:
                 if name not in (at_step, own):
                     # trees differ a little in their size: what counts is nodes a second
                     found.ratios[f"{size:.0e}: {ours} / {name}"] = (
-                        rounds.faster(ours, name) * counts[ours] / counts[name]
+                        rounds.faster(ours, name) * nodes[ours] / nodes[name]
                     )
     return found
 
 
-def _count(grown: object) -> int:
-    if isinstance(grown, Tree):
-        return grown.count
-    return int(grown[0]) if isinstance(grown, tuple) else int(str(grown))
+def _needed(scene: Scene, size: int) -> float:
+    """Bytes that all rivals' trees of `size` nodes take, about."""
+    small = TreeGrower(scene.robot, scene.settings.changed(capacity=1000))
+    return 3 * held(small) / 1000 * size
 
 
-def _ours(scene: Scene, size: int, step: float) -> Callable[[], Tree]:
+def _ours(scene: Scene, size: int, step: float) -> Callable[[], int]:
     settings = scene.settings.changed(
         time_step=step, capacity=size, cycle=duration(size),
         primitives=(duration(size),) * (DEEPEST - 1), guide="euclidean",
@@ -104,20 +119,20 @@ def _ours(scene: Scene, size: int, step: float) -> Callable[[], Tree]:
     ).field(model, goal, np.zeros(2))  # fmt: skip
     proof = int(model.proving_brakes(ROOT[None], np.array([model.stamp]))[0])
     grower = TreeGrower(scene.robot, settings)
-    return lambda: grower.grow(model, guide, ROOT, model.stamp, proof)
+    return lambda: grower.grow(model, guide, ROOT, model.stamp, proof).count
 
 
 def _others(
     loops: ModuleType, scene: Scene, arrival: np.ndarray, controls: np.ndarray, size: int
-) -> Callable[[], tuple[int, int]]:
+) -> Callable[[], int]:
     ticks, steps = reference.ticks_of(arrival), round(duration(size) / STEP)
     return lambda: grown(loops, ticks, scene.cell, controls, steps, size)
 
 
 def grown(
     loops: ModuleType, ticks: np.ndarray, cell: float, controls: np.ndarray, steps: int, size: int
-) -> tuple[int, int]:
-    """(nodes, children checked) of a tree that is grown level by level by plain loops.
+) -> int:
+    """Nodes of a tree that is grown level by level by plain loops.
 
     Args:
         loops: `reference`, or `compiled`.
@@ -130,12 +145,11 @@ def grown(
     nodes = np.zeros((size, 6), dtype=np.float32)
     parent = np.full(size, -1, dtype=np.int32)
     nodes[0, :5] = ROOT
-    first, last, checked = 0, 1, 0
+    first, last = 0, 1
     while first < last < size:
         ends, safe = loops.children(ticks, cell, nodes[first:last], controls, steps, STEP)
-        checked += len(safe)
         kept = np.flatnonzero(safe)[: size - last]
         nodes[last : last + len(kept)] = ends[kept]
         parent[last : last + len(kept)] = first + kept // len(controls)
         first, last = last, last + len(kept)
-    return last, checked
+    return last
