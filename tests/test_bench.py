@@ -6,6 +6,7 @@ import json
 import numpy as np
 import pytest
 
+from passpmp_ti import device
 from passpmp_ti.bench import baseline, check, command, machine, memory, reference, tree
 from passpmp_ti.bench.found import Found, Options, aligned, document, report
 from passpmp_ti.bench.our_check import our_check
@@ -146,6 +147,14 @@ def test_what_we_call_safe_is_safe_at_small_steps(scene, drawn, step):
     assert not (ours & ~check.truly_safe(scene, states, None)).any()
 
 
+def test_a_device_s_arrays_give_the_same_verdicts(scene, drawn):
+    _, ticks, states = drawn
+    here = verdicts(scene, ticks, states, check.STEP)
+    with device.forced():
+        there = verdicts(scene, ticks, states, check.STEP)
+    assert np.array_equal(here, there)
+
+
 def test_the_reference_tree_holds_only_what_is_safe():
     scene = car_scene("ring")
     ticks = reference.ticks_of(
@@ -180,6 +189,8 @@ def test_arrays_are_counted_once_whoever_looks_at_them():
 
     Owner.__module__ = "passpmp_ti.invented"
     assert memory.held(Owner()) == 160
+    with device.forced():
+        assert memory.held([device.empty((10, 4), np.uint16)]) == 80
 
 
 # the command
