@@ -2,12 +2,14 @@
 
 import importlib.util
 import json
+import sys
+import types
 
 import numpy as np
 import pytest
 
 from passpmp_ti import device
-from passpmp_ti.bench import baseline, check, command, machine, memory, reference, tree
+from passpmp_ti.bench import baseline, check, command, machine, memory, reference, suite, tree
 from passpmp_ti.bench.found import Found, Options, aligned, document, report
 from passpmp_ti.bench.our_check import our_check
 from passpmp_ti.bench.rounds import interleaved
@@ -161,9 +163,9 @@ def test_the_reference_tree_holds_only_what_is_safe():
         reference.arrival_seconds(scene.scan(), scene.size, scene.cell, 1.7, 5.0)
     )
     controls = np.array([c[1:] for c in scene.robot.controls], dtype=np.float32)
-    assert tree.grown(reference, ticks, scene.cell, controls, 12, 500) == 500
+    assert tree.grown(reference, ticks, scene.cell, controls, 12, 500).nodes == 500
     nothing_free = np.zeros_like(ticks)
-    assert tree.grown(reference, nothing_free, scene.cell, controls, 12, 500) == 1
+    assert tree.grown(reference, nothing_free, scene.cell, controls, 12, 500).nodes == 1
 
 
 @pytest.mark.skipif(not HAS_NUMBA, reason="Numba is not installed")
@@ -226,6 +228,30 @@ def test_a_benchmark_runs_end_to_end_and_is_compared_with_what_was_committed(tmp
 def test_what_cannot_be_measured_is_refused(asked, told, capsys):
     assert main(["bench", *asked]) == BAD_INPUT
     assert told in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(("name", "beside"), [("raster", "NumPy"), ("tree", "NumPy")])
+def test_a_map_and_a_tree_stand_beside_others(name, beside, tmp_path, capsys):
+    asked = ["bench", name, "--quick", "--sizes", "50", "--results", str(tmp_path)]
+    assert main([*asked, "--json", str(tmp_path / "all.json")]) == 0
+    result = json.loads((tmp_path / "all.json").read_text())["results"][0]
+    assert all(ratio > 0 for ratio in result["ratios"].values())
+    assert any(key.endswith(f"ours / {beside}") for key in result["ratios"])
+    assert not (tmp_path / f"{name}-cpu.json").exists()
+
+
+def test_the_swarm_s_figures_become_a_table_and_ratios(monkeypatch):
+    def measure_swarm(seed, progress, nodes=(10,)):
+        progress("swarm")
+        row = {"particles": 20, "nodes": nodes[0], "depth": 3, "swarm_seconds": 0.001}
+        row |= {"numpy_seconds": 0.05, "numpy_ratio": 50.0}
+        return {"rows": [row | {"numba_seconds": None, "numba_ratio": None}]}
+
+    module = types.SimpleNamespace(measure_swarm=measure_swarm)
+    monkeypatch.setitem(sys.modules, "passpmp_ti.bench.swarm", module)
+    (told,) = suite.carry_out(["swarm"], Options(sizes=(1000,)))
+    assert told["rows"][0]["ours [ms]"] == 1.0
+    assert told["ratios"] == {"20 x 1e+03: ours / NumPy, every priority": 50.0}
 
 
 def test_a_memory_table_tells_of_every_owner():

@@ -130,8 +130,8 @@ class Limit:
     def tree(
         self, scene: Scene, arrival: np.ndarray, root: np.ndarray, controls: np.ndarray,
         duration: float, capacity: int, step: float,
-    ) -> Callable[[], int]:  # fmt: skip
-        """The call that grows a tree and tells its nodes.
+    ) -> Callable[[], tuple[int, int]]:  # fmt: skip
+        """The call that grows a tree: (nodes, children that were tried).
 
         Args:
             scene: whose grid.
@@ -154,14 +154,14 @@ class Limit:
         pull, steering = (np.ascontiguousarray(c, dtype=np.float32) for c in controls.T)
         checked = ctypes.c_long()
 
-        def call() -> int:
+        def call() -> tuple[int, int]:
             levels = self._library.tree_c(
                 ctypes.byref(frame), ctypes.byref(grids), len(pull), _at(pull), _at(steering),
                 ctypes.c_float(duration), capacity, PAD - 2, pointers, _at(parent), _at(control),
                 _at(first), _at(children), _at(offsets), 1, ctypes.byref(checked),
             )  # fmt: skip
             _ = kept, nodes  # the C++ knows them by address alone
-            return int(offsets[levels + 1])
+            return int(offsets[levels + 1]), int(checked.value)
 
         return call
 

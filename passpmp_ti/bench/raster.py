@@ -47,7 +47,7 @@ def measure(options: Options) -> Found:
         }
         if compiled is not None:
             racing[rivals.NUMBA] = partial(compiled.arrival_seconds, *given)
-        row: dict[str, object] = {"scene": label}
+        row: dict[str, object] = {}
         if limit is not None:
             racing[rivals.CPP], theirs = limit.raster(*given)
             racing[rivals.CPP]()

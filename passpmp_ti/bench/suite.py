@@ -9,6 +9,8 @@ from typing import Any
 from passpmp_ti.bench.found import Found, Options, document
 from passpmp_ti.bench.machine import circumstances
 
+QUICK_SWARM_SIZES = (1_000, 100_000)
+
 
 def carry_out(names: Sequence[str], options: Options) -> Iterator[dict[str, Any]]:
     """Each benchmark's result in turn, ready for JSON; the kernels must have been started."""
@@ -28,10 +30,24 @@ def _measure(name: str) -> Callable[[Options], Found]:
 
 def _swarm(options: Options) -> Found:
     swarm = importlib.import_module("passpmp_ti.bench.swarm")
-    found = swarm.measure_swarm(progress=options.see)
-    return Found(
-        title=str(found.get("title", "particles x nodes x iterations")),
-        rows=list(found["rows"]),
-        ratios=dict(found.get("ratios", {})),
-        notes=list(found.get("notes", [])),
-    )
+    asked: dict[str, Any] = {"seed": options.seed, "progress": options.see}
+    sizes = options.sizes or (QUICK_SWARM_SIZES if options.quick else None)
+    if sizes:
+        asked["nodes"] = sizes
+    told = swarm.measure_swarm(**asked)
+    rivals = {"swarm": "ours", "numpy": "NumPy, every priority", "numba": "Numba, every priority"}
+    rows: list[dict[str, Any]] = []
+    ratios = {}
+    for row in told["rows"]:
+        label = f"{row['particles']} x {row['nodes']:.0e}"
+        seconds = {key: row.get(f"{key}_seconds") for key in rivals}
+        rows.append(
+            {
+                **{key: row[key] for key in ("particles", "nodes", "depth") if key in row},
+                **{f"{rivals[key]} [ms]": 1e3 * s for key, s in seconds.items() if s is not None},
+            }
+        )
+        for key in ("numpy", "numba"):
+            if row.get(f"{key}_ratio") is not None:
+                ratios[f"{label}: ours / {rivals[key]}"] = row[f"{key}_ratio"]
+    return Found(title="an iteration of the swarm, in ms", rows=rows, ratios=ratios, details=told)
