@@ -51,9 +51,7 @@ def measure(options: Options) -> Found:
             before = resident_set()
             made = make()
             computed = held(made)
-            for array in arrays_of(made):
-                if isinstance(array, np.ndarray):
-                    array.fill(0)
+            _touch(made)
             measured = max(resident_set() - before, 0)
             del made
             name = f"{owner}, {size:,} nodes"
@@ -121,6 +119,13 @@ def available() -> int:
             if line.startswith("MemAvailable:"):
                 return 1024 * int(line.split()[1])
     return 0
+
+
+def _touch(owner: object) -> None:
+    """Write to every array in the host's memory."""
+    for array in arrays_of(owner):
+        if isinstance(array, np.ndarray):
+            array.fill(0)
 
 
 def _give_back() -> None:
