@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import contextlib
 import io
-import json
 import math
 import os
 import sys
@@ -14,6 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from passpmp_ti import door
+from passpmp_ti.bench import command
 
 if TYPE_CHECKING:
     from passpmp_ti.sim.scenario import Scenario
@@ -147,17 +147,12 @@ def _map(given: argparse.Namespace) -> int:
     return 0
 
 
-def _bench_cycle(given: argparse.Namespace) -> int:
-    scenario = _scenario(given)
-    from passpmp_ti.bench.cycle import measure_cycle
-    from passpmp_ti.viz.report import cycle_report
+def _bench(given: argparse.Namespace) -> int:
+    def scenario_of(name: str) -> Scenario:
+        given.scenario = name
+        return _scenario(given)
 
-    _start()
-    found = measure_cycle(scenario, given.cycles, given.seed)
-    print(cycle_report(found))
-    if given.json:
-        Path(given.json).write_text(json.dumps(found, indent=2) + "\n")
-    return 0
+    return command.run(given, scenario_of)
 
 
 def _attack(given: argparse.Namespace) -> int:
@@ -364,29 +359,11 @@ def _parser() -> argparse.ArgumentParser:
         "--out", default="map.png", metavar="FILE", help="picture (default: map.png)"
     )
 
-    bench = commands.add_parser(
-        "bench",
-        help="measure",
-        epilog="example:\n  passpmp bench cycle",
-        formatter_class=argparse.RawDescriptionHelpFormatter,
+    bench = _command(
+        commands, "bench", "measure speed and memory, beside others", _bench, command.EXAMPLE
     )
-    measures = bench.add_subparsers(required=True, metavar="measure")
-    cycle = _command(
-        measures,
-        "cycle",
-        "time of a planning cycle, scan to trajectory",
-        _bench_cycle,
-        "passpmp bench cycle --cycles 200 --json cycle.json",
-    )
-    _scenario_options(cycle, default="crowded")
-    cycle.add_argument(
-        "--cycles",
-        type=int,
-        default=1000,
-        metavar="N",
-        help="how many are measured (default: 1000)",
-    )
-    cycle.add_argument("--json", metavar="FILE", help="write the figures there")
+    command.add_options(bench)
+    _scenario_changes(bench)
 
     _attack_options(
         _command(
@@ -478,16 +455,12 @@ def _command(
     return parser
 
 
-def _scenario_options(parser: argparse.ArgumentParser, default: str | None = None) -> None:
-    if default is None:
-        parser.add_argument("scenario", help="a shipped name (see `passpmp scenarios`) or a file")
-    else:
-        parser.add_argument(
-            "scenario",
-            nargs="?",
-            default=default,
-            help=f"a shipped name or a file (default: {default})",
-        )
+def _scenario_options(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("scenario", help="a shipped name (see `passpmp scenarios`) or a file")
+    _scenario_changes(parser)
+
+
+def _scenario_changes(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--seed", type=int, default=0, metavar="N", help="of movers, noise and planner (default: 0)"
     )

@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-import os
-import platform
-import sys
-from importlib import metadata
-from pathlib import Path
+import time
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from passpmp_ti import backend, door
+from passpmp_ti.bench import reference
+from passpmp_ti.bench.found import Found, Options
+from passpmp_ti.bench.machine import machine
+from passpmp_ti.bench.scenes import car_scene
 from passpmp_ti.sim.episode import simulate
-from passpmp_ti.sim.scenario import Scenario
+from passpmp_ti.sim.scenario import Scenario, load_scenario
 
 if TYPE_CHECKING:
     from passpmp_ti.sim.episode import CycleInfo
@@ -22,6 +23,13 @@ PAPER = 0.029
 """Average running time of PASSPMP-PSO in Table VII, on a Core i7 of 1.6 GHz [s]."""
 WARM_UP = 5
 """Cycles left out as the first episode begins: they load or compile the kernels."""
+
+
+QUICK_CYCLES = 100
+LONG = (0.4,) * 7
+"""Primitives that make a tree of ten thousand nodes [s]."""
+YARDSTICK_EVERY = 25
+"""Cycles between two looks at how fast the machine is just now."""
 
 
 class _EnoughError(Exception):
@@ -33,16 +41,65 @@ class _Stopwatch:
         self.skip, self.wanted = skip, wanted
         self.timings: list[dict[str, float]] = []
         self.nodes: list[int] = []
+        self.yardstick: list[float] = []
 
     def see(self, info: CycleInfo) -> None:
         if self.skip > 0:
             self.skip -= 1
             return
+        if len(self.timings) % YARDSTICK_EVERY == 0:
+            self.yardstick.append(_yardstick())
         record = info.navigator.record
         self.timings.append(record.timings)
         self.nodes.append(record.tree_nodes)
         if len(self.timings) >= self.wanted:
             raise _EnoughError
+
+
+def measure(options: Options) -> Found:
+    """Drive the scenes of `cycle`, or the one asked for, and take the time of every cycle."""
+    from passpmp_ti.viz.report import cycle_report
+
+    scenes = [options.scenario] if options.scenario else default_scenes()
+    cycles = min(options.cycles, QUICK_CYCLES) if options.quick else options.cycles
+    found = Found(
+        title="scan to trajectory, in ms",
+        rows=[],
+        ratios={},
+        notes=["yardstick: the plain NumPy map of an 80 m sweep (`raster`), taken between cycles"],
+    )
+    for scenario in scenes:
+        options.see(f"cycle: {scenario.name}")
+        one = measure_cycle(scenario, cycles, options.seed)
+        total = one["seconds"]["total"]
+        found.details[scenario.name] = one
+        found.rows.append(
+            {
+                "scene": scenario.name,
+                **{f"{key} [ms]": 1e3 * total[key] for key in ("median", "p99", "worst")},
+                "nodes, median": int(one["tree_nodes_median"]),
+                "nodes, most": one["tree_nodes_most"],
+                "yardstick [ms]": 1e3 * one["yardstick_seconds"],
+            }
+        )
+        for key in ("median", "p99"):
+            share = one["yardstick_seconds"] / total[key]
+            found.ratios[f"{scenario.name}: {key} / yardstick"] = share
+        found.notes.append("\n" + cycle_report(one))
+    return found
+
+
+def default_scenes() -> list[Scenario]:
+    """A crowd about a car, with trees of three sizes, and a wheelchair that meets a person."""
+    crowded, corridor = load_scenario("crowded"), load_scenario("corridor_person")
+    return [
+        replace(crowded.changed({"capacity": 40}), name="crowded, 40 nodes"),
+        replace(crowded, name="crowded"),
+        replace(
+            crowded.changed({"capacity": 10_000, "primitives": LONG}), name="crowded, 10,000 nodes"
+        ),
+        replace(corridor, name="wheelchair, 1081 beams"),
+    ]
 
 
 def measure_cycle(scenario: Scenario, cycles: int = 1000, seed: int = 0) -> dict[str, Any]:
@@ -85,33 +142,11 @@ def measure_cycle(scenario: Scenario, cycles: int = 1000, seed: int = 0) -> dict
         "tree_nodes_most": int(max(watch.nodes)),
         "seconds": seconds,
         "paper_seconds": PAPER,
+        "yardstick_seconds": float(np.median(watch.yardstick)),
         "share_of_paper": seconds["total"]["median"] / PAPER,
         "backend": arch,
         **machine(),
     }
-
-
-def machine() -> dict[str, Any]:
-    """The machine, in words and numbers, and the versions of what ran on it."""
-    return {
-        "machine": processor(),
-        "cores": len(os.sched_getaffinity(0))
-        if hasattr(os, "sched_getaffinity")
-        else os.cpu_count(),
-        "system": f"{platform.system()} {platform.release()}",
-        "python": sys.version.split()[0],
-        **{name: metadata.version(name) for name in ("taichi", "numpy")},
-    }
-
-
-def processor() -> str:
-    """The processor's name, as well as the system tells it."""
-    listing = Path("/proc/cpuinfo")
-    if listing.is_file():
-        for line in listing.read_text(errors="replace").splitlines():
-            if line.startswith("model name"):
-                return line.partition(":")[2].strip()
-    return platform.processor() or platform.machine()
 
 
 def _spread(seconds: np.ndarray) -> dict[str, float]:
@@ -120,3 +155,14 @@ def _spread(seconds: np.ndarray) -> dict[str, float]:
         "p99": float(np.quantile(seconds, 0.99)),
         "worst": float(seconds.max()),
     }
+
+
+def _yardstick() -> float:
+    """How long a fixed piece of plain NumPy takes on this machine just now [s]."""
+    scene = car_scene("crowded")
+    scan = scene.scan()
+    began = time.perf_counter()
+    reference.arrival_seconds(
+        scan, scene.size, scene.cell, scene.robot.radius, scene.settings.object_speed
+    )
+    return time.perf_counter() - began
