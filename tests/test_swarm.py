@@ -12,7 +12,7 @@ from passpmp_ti.kernels.swarm import EMPTY
 from passpmp_ti.kernels.tree import CHILDREN, PARENT
 from passpmp_ti.kernels.tree import TICK as TICK_COLUMN
 from passpmp_ti.planner.objective import horizon
-from passpmp_ti.planner.swarm import Swarm, best_leaf, slots_for
+from passpmp_ti.planner.swarm import Swarm, best_leaf, leaf_costs, slots_for
 from passpmp_ti.settings import Settings
 
 ROBOT = CarLike()
@@ -35,9 +35,7 @@ def on_device(tree):
 @pytest.mark.parametrize("particles", [20, 50, 100])
 def test_the_swarm_finds_the_optimum_in_99_of_100_runs(nodes, particles):
     generator = np.random.default_rng(nodes * 1000 + particles)
-    settings = LAST_STATE.changed(
-        particles=particles, sub_swarms=1, capacity=nodes, iterations=200
-    )
+    settings = LAST_STATE.changed(particles=particles, sub_swarms=1, capacity=nodes, iterations=200)
     swarm = Swarm(ROBOT, settings)
     found = 0
     for _ in range(100):
@@ -131,6 +129,9 @@ def test_the_cheapest_leaf_is_the_cheapest_by_definition(nodes, distance):
     assert leaf in tree.leaves
     assert cost == pytest.approx(costs[leaf], rel=1e-6)
     assert cost == pytest.approx(costs.min(), rel=1e-6)
+    every = leaf_costs(tree, ROBOT, settings)
+    np.testing.assert_allclose(every, costs, rtol=1e-6)
+    assert (leaf, cost) == (np.argmin(every), every.min())
     with device.forced():
         assert best_leaf(on_device(tree), ROBOT, settings) == (leaf, cost)
 

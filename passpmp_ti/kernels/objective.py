@@ -32,6 +32,23 @@ def plan_cost(leaf, link: ti.template(), cost: ti.template(), numbers: ti.templa
 
 
 @ti.kernel
+def every_cost(
+    # in
+    count: ti.i32,
+    link: Links,
+    cost: Costs,
+    numbers: Numbers,
+    # out
+    f: Numbers,  # [>= count]
+):
+    """What the plan to each leaf costs; infinitely much where no plan ends."""
+    for n in range(count):
+        f[n] = ti.math.inf
+        if link[n, CHILDREN] == 0:
+            f[n] = plan_cost(n, link, cost, numbers)
+
+
+@ti.kernel
 def cheapest(
     # in
     count: ti.i32,  # nodes in the tree

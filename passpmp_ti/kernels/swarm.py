@@ -31,7 +31,7 @@ EMPTY = -1
 VELOCITY_MAX, COGNITIVE, SOCIAL = range(TICK_LENGTH + 1, TICK_LENGTH + 4)
 """What the swarm is told, after what `plan_cost` is: V_pmax, w_c, w_s."""
 SHARE = 512  # indices of a loop that one thread of a CPU takes at a time, however few there are
-TURNS = 8  # iterations in one launch of `search_together`
+TURNS = 4  # iterations in one launch of `search_together`
 
 
 @ti.func
@@ -72,9 +72,7 @@ def slot_of(row, parent, mask, keys: ti.template()):
 
 
 @ti.func
-def cast_lots(
-    start, at, first, children, numbers: ti.template(), state: ti.template()
-):
+def cast_lots(start, at, first, children, numbers: ti.template(), state: ti.template()):
     """Algorithm 4: random priorities and velocities of siblings, whose state begins at `at`."""
     for k in range(children):
         place, push = drawn(start, first + k)

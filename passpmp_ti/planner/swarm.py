@@ -2,18 +2,40 @@
 
 from __future__ import annotations
 
+from typing import Protocol
+
 import numpy as np
 
 from passpmp_ti import device
-from passpmp_ti.kernels.objective import BLOCK, cheapest
+from passpmp_ti.device import Array
+from passpmp_ti.kernels.objective import BLOCK, cheapest, every_cost
 from passpmp_ti.kernels.swarm import FIELDS, TURNS, forget_all, search, search_together
 from passpmp_ti.planner.objective import objective_numbers
-from passpmp_ti.planner.tree import Tree
 from passpmp_ti.robots import Robot
 from passpmp_ti.settings import Settings
 
 MOST = 2**31 - 1
 """Numbers in one array that a kernel can tell apart."""
+
+
+class Branches(Protocol):
+    """What the choice reads of a tree."""
+
+    @property
+    def link(self) -> Array:
+        """[>= count, 8] int32, see kernels/tree.py."""
+
+    @property
+    def cost(self) -> Array:
+        """[>= count, 5] float32, see there."""
+
+    @property
+    def count(self) -> int:
+        """Nodes, the root among them."""
+
+    @property
+    def depth(self) -> int:
+        """Most parents on the way to a leaf, or more."""
 
 
 class Swarm:
@@ -37,7 +59,7 @@ class Swarm:
         self._hold(slots_for(settings.iterations, len(settings.levels), settings.capacity))
 
     def choose(
-        self, tree: Tree, generator: np.random.Generator
+        self, tree: Branches, generator: np.random.Generator
     ) -> tuple[int, tuple[int, ...], float]:
         """The best plan that the swarm found (Algorithm 3).
 
@@ -95,7 +117,15 @@ def slots_for(iterations: int, depth: int, nodes: int) -> int:
     return 1 << (enough - 1).bit_length()
 
 
-def best_leaf(tree: Tree, robot: Robot, settings: Settings) -> tuple[int, float]:
+def leaf_costs(tree: Branches, robot: Robot, settings: Settings) -> np.ndarray:
+    """[count] float32 f of eq. 5 for the plan to each leaf; inf where no plan ends."""
+    f = device.empty((tree.count,), np.float32)
+    numbers = device.put(objective_numbers(settings, robot))
+    every_cost(tree.count, tree.link, tree.cost, numbers, f)
+    return device.host(f)
+
+
+def best_leaf(tree: Branches, robot: Robot, settings: Settings) -> tuple[int, float]:
     """(the leaf where the cheapest plan of the tree ends, its cost); ties go to the lowest index.
 
     The root where no plan costs less than infinity.

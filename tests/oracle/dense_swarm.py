@@ -88,5 +88,3 @@ def search(tree, costs, seed, settings):
         ends.extend(end)
     cost, leaf = min(best, key=lambda found: found[0])
     return int(leaf), cost, tuple(np.unique(ends).tolist())
-
-
