@@ -77,6 +77,7 @@ def test_tables_are_as_large_as_walks_can_fill_and_stay_half_empty():
     tree = random_tree(30_000, np.random.default_rng(3), fans=(9, 10))
     swarm = Swarm(ROBOT, LAST_STATE)
     swarm.choose(tree, np.random.default_rng(3))
+    assert tree.depth >= len(LAST_STATE.levels)
     slots = slots_for(LAST_STATE.iterations, tree.depth, tree.count)
     keys = swarm._keys[: 22 * slots].reshape(22, slots)
     assert slots < tree.count / 50

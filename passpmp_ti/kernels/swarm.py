@@ -22,6 +22,7 @@ so that every search ends.
 
 import taichi as ti
 
+from passpmp_ti.kernels.draws import drawn, stream
 from passpmp_ti.kernels.objective import TICK_LENGTH, Costs, Counts, Numbers, plan_cost
 from passpmp_ti.kernels.tree import CHILDREN, FIRST, PARENT, STEPS, Links
 
@@ -32,33 +33,6 @@ VELOCITY_MAX, COGNITIVE, SOCIAL = range(TICK_LENGTH + 1, TICK_LENGTH + 4)
 """What the swarm is told, after what `plan_cost` is: V_pmax, w_c, w_s."""
 SHARE = 512  # indices of a loop that one thread of a CPU takes at a time, however few there are
 TURNS = 4  # iterations in one launch of `search_together`
-
-
-@ti.func
-def scrambled(x):
-    """A 32-bit integer hash with full avalanche."""
-    x ^= x >> ti.u32(16)
-    x *= ti.u32(0x7FEB352D)
-    x ^= x >> ti.u32(15)
-    x *= ti.u32(0x846CA68B)
-    x ^= x >> ti.u32(16)
-    return x
-
-
-@ti.func
-def stream(seed, particle, turn):
-    """What the draws of one particle in one turn begin from."""
-    h = scrambled(seed ^ ti.cast(turn, ti.u32) * ti.u32(0x9E3779B9))
-    return scrambled(h ^ ti.cast(particle, ti.u32) * ti.u32(0x85EBCA6B))
-
-
-@ti.func
-def drawn(start, node):
-    """Two numbers in [0, 1), of 16 bits each, that depend on nothing but stream and node."""
-    h = scrambled(start ^ ti.cast(node, ti.u32) * ti.u32(0xC2B2AE35))
-    high = ti.cast(ti.cast(h >> ti.u32(16), ti.i32), ti.f32)
-    low = ti.cast(ti.cast(h & ti.u32(0xFFFF), ti.i32), ti.f32)
-    return high * (1.0 / 65536.0), low * (1.0 / 65536.0)
 
 
 @ti.func

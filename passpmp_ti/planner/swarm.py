@@ -72,7 +72,8 @@ class Swarm:
             what the plan costs); the root where no plan costs less than infinity.
         """
         settings = self._settings
-        slots = slots_for(settings.iterations, tree.depth, tree.count)
+        depth = max(tree.depth, len(settings.levels))
+        slots = slots_for(settings.iterations, depth, tree.count)
         if slots > self._slots:
             self._hold(slots)
         task = (
