@@ -71,7 +71,6 @@ def walk(
     velocity_max = numbers[VELOCITY_MAX]
     cognitive = numbers[COGNITIVE]
     social = numbers[SOCIAL]
-    unmet = stream(seed, p, 0)
     now = stream(seed, p, 2 * iteration)
     node = 0
     children = link[0, CHILDREN]
@@ -81,7 +80,7 @@ def walk(
         at = slot * fan * FIELDS
         if keys[slot] == EMPTY:
             keys[slot] = node
-            cast_lots(unmet, at, first, children, numbers, state)
+            cast_lots(stream(seed, p, 0), at, first, children, numbers, state)
             for k in range(children):
                 state[at + FIELDS * k + BEST] = state[at + FIELDS * k + POSITION]
         # where the best walk never was, nothing pulls: the target is where the particle is
