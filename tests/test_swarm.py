@@ -12,7 +12,7 @@ from passpmp_ti.kernels.swarm import EMPTY
 from passpmp_ti.kernels.tree import CHILDREN, PARENT
 from passpmp_ti.kernels.tree import TICK as TICK_COLUMN
 from passpmp_ti.planner.objective import horizon
-from passpmp_ti.planner.swarm import Swarm, best_leaf, leaf_costs, slots_for
+from passpmp_ti.planner.swarm import Swarm, best_leaf, leaf_costs, table_size
 from passpmp_ti.settings import Settings
 
 ROBOT = CarLike()
@@ -69,24 +69,31 @@ def test_particles_side_by_side_end_where_sub_swarms_side_by_side_do(nodes, iter
 
 
 def test_tables_are_as_large_as_walks_can_fill_and_stay_half_empty():
-    # 26 walks over at most 6 parents: 312 slots are twice what they can meet
-    assert slots_for(25, 6, 10**7) == 512
-    assert slots_for(25, 6, 512) == 512
-    assert slots_for(25, 6, 511) == 512
-    assert slots_for(25, 6, 100) == 128
-    tree = random_tree(30_000, np.random.default_rng(3), fans=(9, 10))
+    # 26 walks over at most 6 parents of 9 children: 312 slots are twice what they can meet
+    assert table_size(25, 6, 10**7, 9) == (512, 3 * 26 * 6 * 9)
+    assert table_size(25, 6, 512, 9) == (512, 3 * 512)
+    assert table_size(25, 6, 100, 9) == (128, 3 * 100)
+    assert table_size(1, 1, 1, 9) == (1, 3)
+
+
+def test_what_a_search_takes_does_not_grow_with_nodes_that_no_particle_visits():
+    tree = random_tree(1 + 9 * 3333, np.random.default_rng(3), fans=(9, 10))
     swarm = Swarm(ROBOT, LAST_STATE)
     swarm.choose(tree, np.random.default_rng(3))
     assert tree.depth >= len(LAST_STATE.levels)
-    slots = slots_for(LAST_STATE.iterations, tree.depth, tree.count)
-    keys = swarm._keys[: 22 * slots].reshape(22, slots)
+    slots, room = table_size(LAST_STATE.iterations, tree.depth, tree.count, 9)
     assert slots < tree.count / 50
-    assert (keys != EMPTY).sum(axis=1).max() <= slots / 2
-    for row in keys:
-        met = row[row != EMPTY]
+    assert swarm._keys.shape == (22 * slots, 2)
+    assert swarm._state.shape == (22 * room,)
+    for row, keys in enumerate(swarm._keys.reshape(22, slots, 2)):
+        met, places = keys[keys[:, 0] != EMPTY].T
+        assert len(met) <= slots / 2
         assert len(np.unique(met)) == len(met)
         assert (tree.link[met, CHILDREN] > 0).all()
         assert np.isin(tree.link[met[met > 0], PARENT], met).all()
+        # nine children's three numbers after the other, in the row's own stretch
+        assert sorted(places) == [row * room + 27 * i for i in range(len(met))]
+        assert 27 * len(met) <= room
 
 
 def test_searches_do_not_remember_each_other():

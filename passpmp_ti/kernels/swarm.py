@@ -7,27 +7,32 @@ and 3) and only those are kept: neither time nor memory grows with nodes that no
 Priorities never yet met are drawn when they are, from a counter hash, so the outcome depends
 neither on threads nor on the order in which nodes are met.
 
-Rows [0, P) are particles, [P, P + S) the best of the sub-swarms. Each row is a hash table of
-`mask` + 1 slots, a power of two; a slot holds the children of one node, the key:
+Rows [0, P) are particles, [P, P + S) the best of the sub-swarms. Each row has a hash table of
+`mask` + 1 slots, a power of two, one slot a parent that its walks met, and a stretch of numbers,
+handed out to one parent's children after the other: what a row uses lies together.
 
-    keys [rows, slots] i32: the parent, or EMPTY
-    state [rows, slots, fan, 3] f32: position, velocity, best of each child; a sub-swarm's row
-        has the best alone
+    keys [rows * slots, 2] i32: the parent, or EMPTY; where its children's numbers begin
+    state [rows * room] f32: position, velocity, best of each child; a sub-swarm's row has the
+        best alone
+    ends [rows, 2] i32: the leaf where the last walk ended, or where the sub-swarm's best does;
+        numbers handed out
 
-Both are flat, and both may be longer. A parent is sought from slot `parent & mask` on: where there
-are as many slots as nodes, each has its own. Else a walk meets one new parent a level at most, and
-the caller gives at least twice iterations x levels slots: the table is never more than half full,
-so that every search ends.
+All may be longer. A parent is sought from slot `parent & mask` on: where there are as many slots
+as parents, each has its own. Else a walk meets one new parent a level at most, and the caller
+gives at least twice walks x levels slots: the table is never more than half full, so that every
+search ends. Parents must be numbered as their children are, as a tree grown by levels is.
 """
 
 import taichi as ti
 
 from passpmp_ti.kernels.draws import drawn, stream
-from passpmp_ti.kernels.objective import TICK_LENGTH, Costs, Counts, Numbers, plan_cost
+from passpmp_ti.kernels.objective import TICK_LENGTH, Costs, Numbers, plan_cost
 from passpmp_ti.kernels.tree import CHILDREN, FIRST, PARENT, STEPS, Links
 
 POSITION, VELOCITY, BEST = range(3)
 FIELDS = 3
+PARENT_KEY, PLACE = range(2)
+LEAF, USED = range(2)
 EMPTY = -1
 VELOCITY_MAX, COGNITIVE, SOCIAL = range(TICK_LENGTH + 1, TICK_LENGTH + 4)
 """What the swarm is told, after what `plan_cost` is: V_pmax, w_c, w_s."""
@@ -36,13 +41,34 @@ TURNS = 4  # iterations in one launch of `search_together`
 
 
 @ti.func
+def mask_for(slots, count, link: ti.template()):
+    """Slots less one of each table: all of them, or fewer where parents are fewer."""
+    mask = slots - 1
+    while mask > 0 and mask >> 1 >= link[count - 1, PARENT]:
+        mask >>= 1
+    return mask
+
+
+@ti.func
 def slot_of(row, parent, mask, keys: ti.template()):
     """The slot where a row keeps the children of `parent`, or the empty one where it would."""
     first = row * (mask + 1)
     slot = parent & mask
-    while keys[first + slot] != parent and keys[first + slot] != EMPTY:
+    while keys[first + slot, PARENT_KEY] != parent and keys[first + slot, PARENT_KEY] != EMPTY:
         slot = (slot + 1) & mask
     return first + slot
+
+
+@ti.func
+def home(row, parent, children, mask, room, keys: ti.template(), ends: ti.template()):
+    """(where a row's numbers for the children of `parent` begin, whether they are new there)."""
+    slot = slot_of(row, parent, mask, keys)
+    new = keys[slot, PARENT_KEY] == EMPTY
+    if new:
+        keys[slot, PARENT_KEY] = parent
+        keys[slot, PLACE] = row * room + ends[row, USED]
+        ends[row, USED] = ends[row, USED] + children * FIELDS  # one writer a row: no atomic
+    return keys[slot, PLACE], new
 
 
 @ti.func
@@ -61,11 +87,12 @@ def walk(
     group,
     iteration,
     mask,
-    fan,
+    room,
     link: ti.template(),
     numbers: ti.template(),
     keys: ti.template(),
     state: ti.template(),
+    ends: ti.template(),
 ):
     """Move the priorities that the walk meets (eqs. 2, 3) and walk by them; returns the leaf."""
     velocity_max = numbers[VELOCITY_MAX]
@@ -76,10 +103,8 @@ def walk(
     children = link[0, CHILDREN]
     while children > 0:
         first = link[node, FIRST]
-        slot = slot_of(p, node, mask, keys)
-        at = slot * fan * FIELDS
-        if keys[slot] == EMPTY:
-            keys[slot] = node
+        at, new = home(p, node, children, mask, room, keys, ends)
+        if new:
             cast_lots(stream(seed, p, 0), at, first, children, numbers, state)
             for k in range(children):
                 state[at + FIELDS * k + BEST] = state[at + FIELDS * k + POSITION]
@@ -87,8 +112,8 @@ def walk(
         target = at + POSITION
         if iteration > 0:
             theirs = slot_of(group, node, mask, keys)
-            if keys[theirs] == node:
-                target = theirs * fan * FIELDS + BEST
+            if keys[theirs, PARENT_KEY] == node:
+                target = keys[theirs, PLACE] + BEST
         chosen = first
         least = ti.math.inf
         for k in range(children):
@@ -122,21 +147,22 @@ def keep(
     row,
     leaf,
     mask,
-    fan,
+    room,
     link: ti.template(),
     keys: ti.template(),
     state: ti.template(),
+    ends: ti.template(),
 ):
     """Make a particle's priorities along its walk to `leaf` the best of a row: its own, or its
     sub-swarm's."""
     node = leaf
     while node != 0:
         node = link[node, PARENT]
-        own = slot_of(p, node, mask, keys) * fan * FIELDS
-        slot = slot_of(row, node, mask, keys)
-        keys[slot] = node
-        for k in range(link[node, CHILDREN]):
-            state[(slot * fan + k) * FIELDS + BEST] = state[own + FIELDS * k + POSITION]
+        children = link[node, CHILDREN]
+        own = keys[slot_of(p, node, mask, keys), PLACE]
+        theirs, _ = home(row, node, children, mask, room, keys, ends)
+        for k in range(children):
+            state[theirs + FIELDS * k + BEST] = state[own + FIELDS * k + POSITION]
 
 
 @ti.func
@@ -146,7 +172,6 @@ def strew(
     iteration,
     leaf,
     mask,
-    fan,
     link: ti.template(),
     numbers: ti.template(),
     keys: ti.template(),
@@ -157,7 +182,7 @@ def strew(
     node = leaf
     while node != 0:
         node = link[node, PARENT]
-        at = slot_of(p, node, mask, keys) * fan * FIELDS
+        at = keys[slot_of(p, node, mask, keys), PLACE]
         cast_lots(anew, at, link[node, FIRST], link[node, CHILDREN], numbers, state)
 
 
@@ -168,25 +193,25 @@ def advance(
     group,
     iteration,
     mask,
-    fan,
+    room,
     link: ti.template(),
     cost: ti.template(),
     numbers: ti.template(),
     keys: ti.template(),
     state: ti.template(),
-    end: ti.template(),
+    ends: ti.template(),
     least: ti.template(),
 ):
     """One iteration of one particle. Its best is its best so far, not better than before."""
-    leaf = walk(seed, p, group, iteration, mask, fan, link, numbers, keys, state)
-    if leaf == end[group] and leaf == end[p]:
-        strew(seed, p, iteration, leaf, mask, fan, link, numbers, keys, state)
+    leaf = walk(seed, p, group, iteration, mask, room, link, numbers, keys, state, ends)
+    if leaf == ends[group, LEAF] and leaf == ends[p, LEAF]:
+        strew(seed, p, iteration, leaf, mask, link, numbers, keys, state)
         least[p] = ti.math.inf
-    end[p] = leaf
+    ends[p, LEAF] = leaf
     f = plan_cost(leaf, link, cost, numbers)
     if f < least[p]:
         least[p] = f
-        keep(p, p, leaf, mask, fan, link, keys, state)
+        keep(p, p, leaf, mask, room, link, keys, state, ends)
 
 
 @ti.func
@@ -195,11 +220,11 @@ def elect(
     first,
     last,
     mask,
-    fan,
+    room,
     link: ti.template(),
     keys: ti.template(),
     state: ti.template(),
-    end: ti.template(),
+    ends: ti.template(),
     least: ti.template(),
 ):
     """The best of particles [first, last), ties to the lowest index, becomes their sub-swarm's.
@@ -213,16 +238,17 @@ def elect(
             least[group] = least[p]
             winner = p
     if winner >= 0:
-        end[group] = end[winner]
-        keep(winner, group, end[winner], mask, fan, link, keys, state)
+        ends[group, LEAF] = ends[winner, LEAF]
+        keep(winner, group, ends[winner, LEAF], mask, room, link, keys, state, ends)
 
 
 @ti.func
-def forget(row, mask, keys: ti.template(), end: ti.template(), least: ti.template()):
+def forget(row, mask, keys: ti.template(), ends: ti.template(), least: ti.template()):
     """Clear a row by its keys alone: what no key leads to is never read."""
     for slot in range(row * (mask + 1), (row + 1) * (mask + 1)):
-        keys[slot] = EMPTY
-    end[row] = 0
+        keys[slot, PARENT_KEY] = EMPTY
+    ends[row, LEAF] = 0
+    ends[row, USED] = 0
     least[row] = ti.math.inf
 
 
@@ -233,50 +259,54 @@ def search(
     iterations: ti.i32,
     particles: ti.i32,  # P
     groups: ti.i32,  # S, divides P
-    mask: ti.i32,
-    fan: ti.i32,
-    link: Links,
-    cost: Costs,
+    slots: ti.i32,  # a power of two
+    room: ti.i32,
+    count: ti.i32,  # nodes, more than one
+    link: Links,  # [>= count, 8]
+    cost: Costs,  # [>= count, 5]
     numbers: Numbers,  # [8]
     # scratch
-    keys: Counts,  # [(P + S) * (mask + 1)]
-    state: Numbers,  # [(P + S) * (mask + 1) * fan * 3]
+    keys: Links,  # [>= (P + S) * slots, 2]
+    state: Numbers,  # [>= (P + S) * room]
     # out
-    end: Counts,  # [P + S] where each last walk ends, where each sub-swarm's best does
+    ends: Links,  # [P + S, 2]
     least: Numbers,  # [P + S] the best cost of each; inf, at the root: none found
 ):
     """Algorithm 3 on the threads of a CPU: sub-swarms run in parallel and do not see each other,
     so that no iteration waits for another thread, and the whole search is one launch."""
     for i in range(groups * SHARE):
         if i % SHARE == 0:
+            mask = mask_for(slots, count, link)
             group = particles + i // SHARE
             first = i // SHARE * (particles // groups)
             last = first + particles // groups
-            forget(group, mask, keys, end, least)
+            forget(group, mask, keys, ends, least)
             for p in range(first, last):
-                forget(p, mask, keys, end, least)
+                forget(p, mask, keys, ends, least)
             for iteration in range(iterations + 1):
                 for p in range(first, last):
                     advance(
-                        seed, p, group, iteration, mask, fan, link, cost, numbers, keys, state,
-                        end, least,
+                        seed, p, group, iteration, mask, room, link, cost, numbers, keys, state,
+                        ends, least,
                     )  # fmt: skip
-                elect(group, first, last, mask, fan, link, keys, state, end, least)
+                elect(group, first, last, mask, room, link, keys, state, ends, least)
 
 
 @ti.kernel
 def forget_all(
     rows: ti.i32,
-    mask: ti.i32,
-    keys: Counts,
-    end: Counts,
+    slots: ti.i32,
+    # out, as of `search`
+    keys: Links,
+    ends: Links,
     least: Numbers,
 ):
     """Begin a search by `search_together`."""
-    for slot in range(rows * (mask + 1)):
-        keys[slot] = EMPTY
+    for slot in range(rows * slots):
+        keys[slot, PARENT_KEY] = EMPTY
     for row in range(rows):
-        end[row] = 0
+        ends[row, LEAF] = 0
+        ends[row, USED] = 0
         least[row] = ti.math.inf
 
 
@@ -288,15 +318,16 @@ def search_together(
     iterations: ti.i32,
     particles: ti.i32,
     groups: ti.i32,
-    mask: ti.i32,
-    fan: ti.i32,
+    slots: ti.i32,
+    room: ti.i32,
+    count: ti.i32,
     link: Links,
     cost: Costs,
     numbers: Numbers,
     # in / out, as of `search`
-    keys: Counts,
+    keys: Links,
     state: Numbers,
-    end: Counts,
+    ends: Links,
     least: Numbers,
 ):
     """Some iterations of Algorithm 3 where threads are many: all particles at once, then all
@@ -304,11 +335,14 @@ def search_together(
     for turn in ti.static(range(TURNS)):
         for p in range(particles):
             if begin + turn <= iterations:
+                mask = mask_for(slots, count, link)
+                group = particles + p // (particles // groups)
                 advance(
-                    seed, p, particles + p // (particles // groups), begin + turn, mask, fan, link,
-                    cost, numbers, keys, state, end, least,
+                    seed, p, group, begin + turn, mask, room, link, cost, numbers, keys, state,
+                    ends, least,
                 )  # fmt: skip
         for s in range(groups):
+            mask = mask_for(slots, count, link)
             first = s * (particles // groups)
             last = first + particles // groups
-            elect(particles + s, first, last, mask, fan, link, keys, state, end, least)
+            elect(particles + s, first, last, mask, room, link, keys, state, ends, least)

@@ -9,7 +9,7 @@ import numpy as np
 from passpmp_ti import device
 from passpmp_ti.device import Array
 from passpmp_ti.kernels.objective import BLOCK, cheapest, every_cost
-from passpmp_ti.kernels.swarm import FIELDS, TURNS, forget_all, search, search_together
+from passpmp_ti.kernels.swarm import FIELDS, LEAF, TURNS, forget_all, search, search_together
 from passpmp_ti.planner.objective import objective_numbers
 from passpmp_ti.robots import Robot
 from passpmp_ti.settings import Settings
@@ -53,10 +53,10 @@ class Swarm:
         self._numbers = device.put(
             np.concatenate((objective_numbers(settings, robot), np.array(own, dtype=np.float32)))
         )
-        self._end = device.empty((self._rows,), np.int32)
+        self._ends = device.empty((self._rows, 2), np.int32)
         self._least = device.empty((self._rows,), np.float32)
-        self._slots = 0
-        self._hold(slots_for(settings.iterations, len(settings.levels), settings.capacity))
+        self._slots = self._room = 0
+        self._hold(len(settings.levels), settings.capacity)
 
     def choose(
         self, tree: Branches, generator: np.random.Generator
@@ -72,50 +72,53 @@ class Swarm:
             what the plan costs); the root where no plan costs less than infinity.
         """
         settings = self._settings
-        depth = max(tree.depth, len(settings.levels))
-        slots = slots_for(settings.iterations, depth, tree.count)
-        if slots > self._slots:
-            self._hold(slots)
+        slots, room = self._hold(max(tree.depth, len(settings.levels)), tree.count)
         task = (
             int(generator.integers(2**32)), settings.iterations, settings.particles,
-            settings.sub_swarms, slots - 1, self._fan, tree.link, tree.cost, self._numbers,
-            self._keys, self._state, self._end, self._least,
+            settings.sub_swarms, slots, room, tree.count, tree.link, tree.cost, self._numbers,
+            self._keys, self._state, self._ends, self._least,
         )  # fmt: skip
         if device.resident():
-            forget_all(self._rows, slots - 1, self._keys, self._end, self._least)
+            forget_all(self._rows, slots, self._keys, self._ends, self._least)
             for begin in range(0, settings.iterations + 1, TURNS):
                 search_together(begin, *task)
         else:
             search(*task)
-        end, least = device.host(self._end), device.host(self._least)
+        end, least = device.host(self._ends)[:, LEAF], device.host(self._least)
         # sub-swarms share their best at the end; ties go to the lowest index
         winner = settings.particles + int(np.argmin(least[settings.particles :]))
         leaves = np.unique(end[: settings.particles])
         return int(end[winner]), tuple(int(n) for n in leaves), float(least[winner])
 
-    def _hold(self, slots: int) -> None:
-        """Make room for tables of so many slots."""
-        size = self._rows * slots * self._fan * FIELDS
-        if size > MOST:
-            settings = self._settings
+    def _hold(self, depth: int, nodes: int) -> tuple[int, int]:
+        """Have tables that a tree needs: (slots, room of each)."""
+        settings = self._settings
+        slots, room = table_size(settings.iterations, depth, nodes, self._fan)
+        if self._rows * max(2 * slots, room) > MOST:
             raise ValueError(
                 f"Settings.particles = {settings.particles} with iterations ="
-                f" {settings.iterations} need {size:.2g} numbers for what walks may meet, and a"
-                f" kernel addresses {MOST}; take fewer particles or fewer iterations"
+                f" {settings.iterations} may meet {self._rows * room:.2g} numbers, and a kernel"
+                f" addresses {MOST}; take fewer particles or fewer iterations"
             )
-        self._slots = slots
-        self._keys = device.empty((self._rows * slots,), np.int32)
-        self._state = device.empty((size,), np.float32)
+        if slots > self._slots:
+            self._keys = device.empty((self._rows * slots, 2), np.int32)
+            self._slots = slots
+        if room > self._room:
+            self._state = device.empty((self._rows * room,), np.float32)
+            self._room = room
+        return slots, room
 
 
-def slots_for(iterations: int, depth: int, nodes: int) -> int:
-    """Slots of a particle's table, a power of two: enough that it can not fill up.
+def table_size(iterations: int, depth: int, nodes: int, fan: int) -> tuple[int, int]:
+    """(slots, a power of two, and numbers) that a particle needs, so that neither can run out.
 
-    A walk meets at most `depth` parents, and a search is `iterations` + 1 walks: twice as many
-    slots leave half of them empty. A tree of fewer nodes gets a slot for each.
+    A walk meets at most `depth` parents of `fan` children each, and a search is `iterations` + 1
+    walks: twice as many slots leave half of them empty. A tree of fewer nodes gets a slot for
+    each, and needs no more numbers than it has nodes.
     """
-    enough = min(2 * (iterations + 1) * depth, nodes)
-    return 1 << (enough - 1).bit_length()
+    parents = (iterations + 1) * depth
+    slots = 1 << (min(2 * parents, nodes) - 1).bit_length()
+    return slots, FIELDS * min(parents * fan, nodes)
 
 
 def leaf_costs(tree: Branches, robot: Robot, settings: Settings) -> np.ndarray:
