@@ -50,14 +50,14 @@ def test_the_dense_swarm_moves_every_priority_and_keeps_it_in_bounds():
     assert np.abs(dense.velocity).max() <= Settings().velocity_max
 
 
-def test_numba_moves_every_priority_and_keeps_it_in_bounds():
+@pytest.mark.parametrize("cores", ["one", "all"])
+def test_numba_moves_every_priority_and_keeps_it_in_bounds(cores):
     pytest.importorskip("numba")
-    moves, dense = compiled_moves(), DenseSwarm(2, 1000, Settings(), seed=1)
+    moves = dict(zip(("one", "all"), compiled_moves(), strict=True))[cores]
+    dense = DenseSwarm(2, 1000, Settings(), seed=1)
     before = dense.position.copy()
     one, two = np.float32(1.0), np.float32(2.0)
-    moves(
-        dense.position, dense.velocity, dense.best, dense.of_group, np.uint32(3), one, two, two
-    )  # fmt: skip
+    moves(dense.position, dense.velocity, dense.best, dense.of_group, np.uint32(3), one, two, two)
     assert (dense.position != before).mean() > 0.99
     assert dense.position.min() >= 0.0
     assert dense.position.max() <= 1.0

@@ -101,7 +101,7 @@ def measure_swarm(
     return {"iterations": ITERATIONS, "rows": rows, "seed": seed, "backend": arch, **machine()}
 
 
-def _row(particles: int, nodes: int, seed: int, compiled: Callable[..., None] | None) -> dict:
+def _row(particles: int, nodes: int, seed: int, compiled: list[Callable[..., None]]) -> dict:
     settings = Settings(
         particles=particles, sub_swarms=2 if particles % 2 == 0 else 1, iterations=ITERATIONS,
         capacity=nodes, distance="final",
@@ -113,24 +113,24 @@ def _row(particles: int, nodes: int, seed: int, compiled: Callable[..., None] | 
     swarm.choose(tree, generator)
     taken: dict[str, list[float]] = {"swarm": [], "numpy": [], "numba": []}
 
-    def move_compiled(turn: int) -> None:
-        assert compiled is not None
-        compiled(
+    def move(moves: Callable[..., None], turn: int) -> None:
+        moves(
             dense.position, dense.velocity, dense.best, dense.of_group, np.uint32(turn),
             np.float32(settings.velocity_max), np.float32(settings.cognitive),
             np.float32(settings.social),
         )  # fmt: skip
 
-    if compiled is not None:
-        move_compiled(0)
+    for moves in compiled:
+        move(moves, 0)
     repeats = min(max(REPEATS, ENOUGH // (particles * nodes)), MOST_REPEATS)
     for repeat in range(repeats):
         # in turn, so that a machine that slows down slows all of them
         searched = _seconds(partial(swarm.choose, tree, generator))
         taken["swarm"].append(searched / (settings.iterations + 1))
         taken["numpy"].append(_seconds(dense.iterate))
-        if compiled is not None:
-            taken["numba"].append(_seconds(partial(move_compiled, repeat + 1)))
+        if compiled:
+            # threads cost more than they bring where there is little to move: the better of both
+            taken["numba"].append(min(_seconds(partial(move, m, repeat + 1)) for m in compiled))
     row: dict[str, Any] = {"particles": particles, "nodes": nodes, "depth": tree.depth}
     for name, seconds in taken.items():
         row[f"{name}_seconds"] = float(np.median(seconds)) if seconds else None
@@ -146,12 +146,15 @@ def _seconds(work: Callable[[], Any]) -> float:
     return time.perf_counter() - began
 
 
-def compiled_moves() -> Callable[..., None] | None:
-    """`DenseSwarm.iterate` by Numba on all cores, draws from the kernel's hash; None without it."""
+def compiled_moves() -> list[Callable[..., None]]:
+    """`DenseSwarm.iterate` by Numba on one core and on all, with draws by the kernel's hash.
+
+    Nothing where Numba is not installed.
+    """
     try:
         import numba
     except ImportError:
-        return None
+        return []
 
     @numba.njit(inline="always")
     def scrambled(x):
@@ -161,7 +164,6 @@ def compiled_moves() -> Callable[..., None] | None:
         x = np.uint32(x * np.uint32(0x846CA68B))
         return x ^ (x >> np.uint32(16))
 
-    @numba.njit(parallel=True)
     def moves(position, velocity, best, of_group, turn, velocity_max, cognitive, social):
         for p in numba.prange(position.shape[0]):
             start = scrambled(scrambled(np.uint32(turn)) ^ np.uint32(p))
@@ -181,4 +183,4 @@ def compiled_moves() -> Callable[..., None] | None:
                 velocity[p, n] = v if x == inside else np.float32(-0.5) * v
                 position[p, n] = inside
 
-    return moves
+    return [numba.njit(moves), numba.njit(parallel=True)(moves)]
