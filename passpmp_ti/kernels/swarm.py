@@ -3,138 +3,253 @@
 A particle holds a priority for each node. Decoding walks from the root: of a node's children the
 one with the least priority x duration is next (eq. 4), until a node has none. Only priorities of
 children of nodes on a particle's walk can change where it goes, so only those are moved (eqs. 2
-and 3): the cost of an iteration does not grow with nodes that no particle visits. Priorities
-never yet met are drawn when they are, from a counter hash, so the outcome does not depend on
-threads. Sub-swarms run in parallel and do not see each other: no iteration waits for another
-thread, and the whole search is one launch.
+and 3) and only those are kept: neither time nor memory grows with nodes that no particle visits.
+Priorities never yet met are drawn when they are, from a counter hash, so the outcome depends
+neither on threads nor on the order in which nodes are met.
+
+Rows [0, P) are particles, [P, P + S) the best of the sub-swarms. Each row has a hash table of
+`mask` + 1 slots, a power of two, one slot a parent that its walks met, and a stretch of numbers,
+handed out to one parent's children after the other: what a row uses lies together.
+
+    keys [rows * slots, 2] i32: the parent, or EMPTY; where its children's numbers begin
+    state [rows * room] f32: position, velocity, best of each child; a sub-swarm's row has the
+        best alone
+    ends [rows, 2] i32: the leaf where the last walk ended, or where the sub-swarm's best does;
+        numbers handed out
+
+All may be longer. A parent is sought from slot `parent & mask` on: where there are as many slots
+as parents, each has its own. Else a walk meets one new parent a level at most, and the caller
+gives at least twice walks x levels slots: the table is never more than half full, so that every
+search ends. Parents must be numbered as their children are, as a tree grown by levels is.
 """
 
 import taichi as ti
 
+from passpmp_ti.kernels.draws import drawn, stream
+from passpmp_ti.kernels.objective import TICK_LENGTH, Costs, Numbers, plan_cost
 from passpmp_ti.kernels.tree import CHILDREN, FIRST, PARENT, STEPS, Links
 
 POSITION, VELOCITY, BEST = range(3)
-UNKNOWN = -1.0  # no priority: they lie in [0, 1]
-
-Floats = ti.types.ndarray(dtype=ti.f32, ndim=1)
-Ints = ti.types.ndarray(dtype=ti.i32, ndim=1)
-Table = ti.types.ndarray(dtype=ti.f32, ndim=2)
-
-
-@ti.func
-def scrambled(x):
-    """A 32-bit integer hash with full avalanche."""
-    x ^= x >> ti.u32(16)
-    x *= ti.u32(0x7FEB352D)
-    x ^= x >> ti.u32(15)
-    x *= ti.u32(0x846CA68B)
-    x ^= x >> ti.u32(16)
-    return x
+FIELDS = 3
+PARENT_KEY, PLACE = range(2)
+LEAF, USED = range(2)
+EMPTY = -1
+VELOCITY_MAX, COGNITIVE, SOCIAL = range(TICK_LENGTH + 1, TICK_LENGTH + 4)
+"""What the swarm is told, after what `plan_cost` is: V_pmax, w_c, w_s."""
+SHARE = 512  # indices of a loop that one thread of a CPU takes at a time, however few there are
+TURNS = 4  # iterations in one launch of `search_together`
 
 
 @ti.func
-def uniform(seed, particle, node, draw):
-    """A number in [0, 1) that depends on nothing but its arguments."""
-    h = scrambled(ti.cast(seed, ti.u32) ^ ti.cast(draw, ti.u32) * ti.u32(0x9E3779B9))
-    h = scrambled(h ^ ti.cast(particle, ti.u32) * ti.u32(0x85EBCA6B))
-    h = scrambled(h ^ ti.cast(node, ti.u32) * ti.u32(0xC2B2AE35))
-    return ti.cast(h >> ti.u32(8), ti.f32) * (1.0 / 16777216.0)
+def mask_for(slots, count, link: ti.template()):
+    """Slots less one of each table: all of them, or fewer where parents are fewer."""
+    mask = slots - 1
+    while mask > 0 and mask >> 1 >= link[count - 1, PARENT]:
+        mask >>= 1
+    return mask
 
 
 @ti.func
-def drawn(seed, velocity_max, count, swarm: ti.template(), p):
-    """Algorithm 4: random priorities and velocities of one particle."""
-    for n in range(count):
-        swarm[p, n, POSITION] = uniform(seed, p, n, 0)
-        swarm[p, n, VELOCITY] = (2.0 * uniform(seed, p, n, 1) - 1.0) * velocity_max
-        swarm[p, n, BEST] = swarm[p, n, POSITION]
+def slot_of(row, parent, mask, keys: ti.template()):
+    """The slot where a row keeps the children of `parent`, or the empty one where it would."""
+    first = row * (mask + 1)
+    slot = parent & mask
+    while keys[first + slot, PARENT_KEY] != parent and keys[first + slot, PARENT_KEY] != EMPTY:
+        slot = (slot + 1) & mask
+    return first + slot
+
+
+@ti.func
+def home(row, parent, children, mask, room, keys: ti.template(), ends: ti.template()):
+    """(where a row's numbers for the children of `parent` begin, whether they are new there)."""
+    slot = slot_of(row, parent, mask, keys)
+    new = keys[slot, PARENT_KEY] == EMPTY
+    if new:
+        keys[slot, PARENT_KEY] = parent
+        keys[slot, PLACE] = row * room + ends[row, USED]
+        ends[row, USED] = ends[row, USED] + children * FIELDS  # one writer a row: no atomic
+    return keys[slot, PLACE], new
+
+
+@ti.func
+def cast_lots(start, at, first, children, numbers: ti.template(), state: ti.template()):
+    """Algorithm 4: random priorities and velocities of siblings, whose state begins at `at`."""
+    for k in range(children):
+        place, push = drawn(start, first + k)
+        state[at + FIELDS * k + POSITION] = place
+        state[at + FIELDS * k + VELOCITY] = (2.0 * push - 1.0) * numbers[VELOCITY_MAX]
 
 
 @ti.func
 def walk(
     seed,
     p,
-    s,
+    group,
     iteration,
-    velocity_max,
-    cognitive,
-    social,
+    mask,
+    room,
     link: ti.template(),
-    swarm: ti.template(),
-    group: ti.template(),
+    numbers: ti.template(),
+    keys: ti.template(),
+    state: ti.template(),
+    ends: ti.template(),
 ):
     """Move the priorities that the walk meets (eqs. 2, 3) and walk by them; returns the leaf."""
+    velocity_max = numbers[VELOCITY_MAX]
+    cognitive = numbers[COGNITIVE]
+    social = numbers[SOCIAL]
+    now = stream(seed, p, 2 * iteration)
     node = 0
-    while link[node, CHILDREN] > 0:
-        chosen = -1
+    children = link[0, CHILDREN]
+    while children > 0:
+        first = link[node, FIRST]
+        at, new = home(p, node, children, mask, room, keys, ends)
+        if new:
+            cast_lots(stream(seed, p, 0), at, first, children, numbers, state)
+            for k in range(children):
+                state[at + FIELDS * k + BEST] = state[at + FIELDS * k + POSITION]
+        # where the best walk never was, nothing pulls: the target is where the particle is
+        target = at + POSITION
+        if iteration > 0:
+            theirs = slot_of(group, node, mask, keys)
+            if keys[theirs, PARENT_KEY] == node:
+                target = keys[theirs, PLACE] + BEST
+        chosen = first
         least = ti.math.inf
-        for k in range(link[node, CHILDREN]):
-            child = link[node, FIRST] + k
-            x = swarm[p, child, POSITION]
+        for k in range(children):
+            own = at + FIELDS * k
+            x = state[own + POSITION]
             if iteration > 0:
-                to_best = cognitive * uniform(seed, p, child, 2 * iteration)
-                to_group = social * uniform(seed, p, child, 2 * iteration + 1)
-                target = group[s, child]
-                if target == UNKNOWN:
-                    # the best walk never met this node: nothing pulls there
-                    target = x
+                to_best, to_group = drawn(now, first + k)
                 v = (
-                    swarm[p, child, VELOCITY]
-                    + to_best * (swarm[p, child, BEST] - x)
-                    + to_group * (target - x)
+                    state[own + VELOCITY]
+                    + cognitive * to_best * (state[own + BEST] - x)
+                    + social * to_group * (state[target + FIELDS * k] - x)
                 )
                 v = ti.min(ti.max(v, -velocity_max), velocity_max)
                 x = x + v
                 # priorities stay in [0, 1]: one that runs into an end bounces off it
-                if x < 0.0 or x > 1.0:
-                    v = -0.5 * v
-                    x = ti.min(ti.max(x, 0.0), 1.0)
-                swarm[p, child, VELOCITY] = v
-                swarm[p, child, POSITION] = x
-            cost = x * link[child, STEPS]
-            if cost < least:
-                least = cost
-                chosen = child
+                inside = ti.min(ti.max(x, 0.0), 1.0)
+                state[own + VELOCITY] = ti.select(x == inside, v, -0.5 * v)
+                x = inside
+                state[own + POSITION] = x
+            cost = x * link[first + k, STEPS]
+            chosen = ti.select(cost < least, first + k, chosen)
+            least = ti.min(cost, least)
         node = chosen
+        children = link[node, CHILDREN]
     return node
 
 
 @ti.func
 def keep(
     p,
-    s,
+    row,
     leaf,
-    of_group: ti.template(),
+    mask,
+    room,
     link: ti.template(),
-    swarm: ti.template(),
-    group: ti.template(),
+    keys: ti.template(),
+    state: ti.template(),
+    ends: ti.template(),
 ):
-    """Copy the priorities along the walk to `leaf` into the particle's best, or the group's."""
+    """Make a particle's priorities along its walk to `leaf` the best of a row: its own, or its
+    sub-swarm's."""
     node = leaf
     while node != 0:
-        above = link[node, PARENT]
-        for k in range(link[above, CHILDREN]):
-            child = link[above, FIRST] + k
-            if ti.static(of_group):
-                group[s, child] = swarm[p, child, POSITION]
-            else:
-                swarm[p, child, BEST] = swarm[p, child, POSITION]
-        node = above
+        node = link[node, PARENT]
+        children = link[node, CHILDREN]
+        own = keys[slot_of(p, node, mask, keys), PLACE]
+        theirs, _ = home(row, node, children, mask, room, keys, ends)
+        for k in range(children):
+            state[theirs + FIELDS * k + BEST] = state[own + FIELDS * k + POSITION]
 
 
 @ti.func
-def strew(seed, velocity_max, p, iteration, leaf, link: ti.template(), swarm: ti.template()):
+def strew(
+    seed,
+    p,
+    iteration,
+    leaf,
+    mask,
+    link: ti.template(),
+    numbers: ti.template(),
+    keys: ti.template(),
+    state: ti.template(),
+):
     """Draw the priorities along a walk anew: a particle that has nothing left to find."""
+    anew = stream(seed, p, 2 * iteration + 1)
     node = leaf
     while node != 0:
-        above = link[node, PARENT]
-        for k in range(link[above, CHILDREN]):
-            child = link[above, FIRST] + k
-            swarm[p, child, POSITION] = uniform(seed, p, child, -2 * iteration - 2)
-            swarm[p, child, VELOCITY] = (
-                2.0 * uniform(seed, p, child, -2 * iteration - 3) - 1.0
-            ) * velocity_max
-        node = above
+        node = link[node, PARENT]
+        at = keys[slot_of(p, node, mask, keys), PLACE]
+        cast_lots(anew, at, link[node, FIRST], link[node, CHILDREN], numbers, state)
+
+
+@ti.func
+def advance(
+    seed,
+    p,
+    group,
+    iteration,
+    mask,
+    room,
+    link: ti.template(),
+    cost: ti.template(),
+    numbers: ti.template(),
+    keys: ti.template(),
+    state: ti.template(),
+    ends: ti.template(),
+    least: ti.template(),
+):
+    """One iteration of one particle. Its best is its best so far, not better than before."""
+    leaf = walk(seed, p, group, iteration, mask, room, link, numbers, keys, state, ends)
+    if leaf == ends[group, LEAF] and leaf == ends[p, LEAF]:
+        strew(seed, p, iteration, leaf, mask, link, numbers, keys, state)
+        least[p] = ti.math.inf
+    ends[p, LEAF] = leaf
+    f = plan_cost(leaf, link, cost, numbers)
+    if f < least[p]:
+        least[p] = f
+        keep(p, p, leaf, mask, room, link, keys, state, ends)
+
+
+@ti.func
+def elect(
+    group,
+    first,
+    last,
+    mask,
+    room,
+    link: ti.template(),
+    keys: ti.template(),
+    state: ti.template(),
+    ends: ti.template(),
+    least: ti.template(),
+):
+    """The best of particles [first, last), ties to the lowest index, becomes their sub-swarm's.
+
+    It moves only between iterations: all particles see the same one. Whose best is below the
+    sub-swarm's found it in this iteration, so it is where that particle is now.
+    """
+    winner = -1
+    for p in range(first, last):
+        if least[p] < least[group]:
+            least[group] = least[p]
+            winner = p
+    if winner >= 0:
+        ends[group, LEAF] = ends[winner, LEAF]
+        keep(winner, group, ends[winner, LEAF], mask, room, link, keys, state, ends)
+
+
+@ti.func
+def forget(row, mask, keys: ti.template(), ends: ti.template(), least: ti.template()):
+    """Clear a row by its keys alone: what no key leads to is never read."""
+    for slot in range(row * (mask + 1), (row + 1) * (mask + 1)):
+        keys[slot, PARENT_KEY] = EMPTY
+    ends[row, LEAF] = 0
+    ends[row, USED] = 0
+    least[row] = ti.math.inf
 
 
 @ti.kernel
@@ -142,45 +257,92 @@ def search(
     # in
     seed: ti.u32,
     iterations: ti.i32,
-    velocity_max: ti.f32,
-    cognitive: ti.f32,
-    social: ti.f32,
-    link: Links,  # [n, 8]
-    leaf_cost: Floats,  # [n]
+    particles: ti.i32,  # P
+    groups: ti.i32,  # S, divides P
+    slots: ti.i32,  # a power of two
+    room: ti.i32,
+    count: ti.i32,  # nodes, more than one
+    link: Links,  # [>= count, 8]
+    cost: Costs,  # [>= count, 5]
+    numbers: Numbers,  # [8]
     # scratch
-    swarm: ti.types.ndarray(dtype=ti.f32, ndim=3),  # [P, cap, 3]
-    group: Table,  # [S, cap]
-    best_cost: Floats,  # [P]
+    keys: Links,  # [>= (P + S) * slots, 2]
+    state: Numbers,  # [>= (P + S) * room]
     # out
-    leaf: Ints,  # [P] where each particle's last walk ends
-    group_leaf: Ints,  # [S] where the best plan of each sub-swarm ends
+    ends: Links,  # [P + S, 2]
+    least: Numbers,  # [P + S] the best cost of each; inf, at the root: none found
 ):
-    """Algorithm 3. Pbest and Gbest are the best so far, not better than the iteration before."""
-    size = swarm.shape[0] // group.shape[0]
-    for s in range(group.shape[0]):
-        group_cost = ti.math.inf
-        for n in range(link.shape[0]):
-            group[s, n] = UNKNOWN
-        for p in range(s * size, (s + 1) * size):
-            best_cost[p] = ti.math.inf
-            drawn(seed, velocity_max, link.shape[0], swarm, p)
-        for iteration in range(iterations + 1):
-            winner = -1
-            for p in range(s * size, (s + 1) * size):
-                end = walk(
-                    seed, p, s, iteration, velocity_max, cognitive, social, link, swarm, group
-                )
-                if iteration > 0 and end == group_leaf[s] and end == leaf[p]:
-                    strew(seed, velocity_max, p, iteration, end, link, swarm)
-                    best_cost[p] = ti.math.inf
-                leaf[p] = end
-                if leaf_cost[end] < best_cost[p]:
-                    best_cost[p] = leaf_cost[end]
-                    keep(p, s, end, False, link, swarm, group)
-                    if leaf_cost[end] < group_cost:
-                        group_cost = leaf_cost[end]
-                        winner = p
-            # the group's best moves only between iterations: all particles see the same one
-            if winner >= 0:
-                group_leaf[s] = leaf[winner]
-                keep(winner, s, leaf[winner], True, link, swarm, group)
+    """Algorithm 3 on the threads of a CPU: sub-swarms run in parallel and do not see each other,
+    so that no iteration waits for another thread, and the whole search is one launch."""
+    for i in range(groups * SHARE):
+        if i % SHARE == 0:
+            mask = mask_for(slots, count, link)
+            group = particles + i // SHARE
+            first = i // SHARE * (particles // groups)
+            last = first + particles // groups
+            forget(group, mask, keys, ends, least)
+            for p in range(first, last):
+                forget(p, mask, keys, ends, least)
+            for iteration in range(iterations + 1):
+                for p in range(first, last):
+                    advance(
+                        seed, p, group, iteration, mask, room, link, cost, numbers, keys, state,
+                        ends, least,
+                    )  # fmt: skip
+                elect(group, first, last, mask, room, link, keys, state, ends, least)
+
+
+@ti.kernel
+def forget_all(
+    rows: ti.i32,
+    slots: ti.i32,
+    # out, as of `search`
+    keys: Links,
+    ends: Links,
+    least: Numbers,
+):
+    """Begin a search by `search_together`."""
+    for slot in range(rows * slots):
+        keys[slot, PARENT_KEY] = EMPTY
+    for row in range(rows):
+        ends[row, LEAF] = 0
+        ends[row, USED] = 0
+        least[row] = ti.math.inf
+
+
+@ti.kernel
+def search_together(
+    # in
+    begin: ti.i32,  # iterations [begin, begin + TURNS) are done, up to and with `iterations`
+    seed: ti.u32,
+    iterations: ti.i32,
+    particles: ti.i32,
+    groups: ti.i32,
+    slots: ti.i32,
+    room: ti.i32,
+    count: ti.i32,
+    link: Links,
+    cost: Costs,
+    numbers: Numbers,
+    # in / out, as of `search`
+    keys: Links,
+    state: Numbers,
+    ends: Links,
+    least: Numbers,
+):
+    """Some iterations of Algorithm 3 where threads are many: all particles at once, then all
+    sub-swarms. Each row has one writer at a time, so it ends as `search` does, to the bit."""
+    for turn in ti.static(range(TURNS)):
+        for p in range(particles):
+            if begin + turn <= iterations:
+                mask = mask_for(slots, count, link)
+                group = particles + p // (particles // groups)
+                advance(
+                    seed, p, group, begin + turn, mask, room, link, cost, numbers, keys, state,
+                    ends, least,
+                )  # fmt: skip
+        for s in range(groups):
+            mask = mask_for(slots, count, link)
+            first = s * (particles // groups)
+            last = first + particles // groups
+            elect(particles + s, first, last, mask, room, link, keys, state, ends, least)

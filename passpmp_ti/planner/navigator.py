@@ -16,7 +16,7 @@ from passpmp_ti.planner.coast import decision_time
 from passpmp_ti.planner.followed import trouble_with
 from passpmp_ti.planner.guide import Guide, GuideField
 from passpmp_ti.planner.intake import Heard, Intake, scans_in
-from passpmp_ti.planner.objective import leaf_costs, trajectory_cost
+from passpmp_ti.planner.objective import trajectory_cost
 from passpmp_ti.planner.place import allowed_gap, carried_on, gap, stitched
 from passpmp_ti.planner.plan import (
     brake_at_once,
@@ -84,7 +84,7 @@ class Navigator:
         self._modelled = False  # whether there ever was a model
         self._generator = np.random.default_rng(seed)
         self._grower = TreeGrower(robot, settings)
-        self._swarm = Swarm(settings) if settings.optimizer == "pso" else None
+        self._swarm = Swarm(robot, settings) if settings.optimizer == "pso" else None
         self._guide: Guide | None = None
         self._next_goal = 0
 
@@ -370,12 +370,10 @@ class Navigator:
         """(leaf, distinct leaves of the particles, its cost); the root where nothing grew."""
         if tree.count == 1:
             return ROOT, (), math.inf
-        costs = leaf_costs(tree, self.settings)
         if self._swarm is None:
-            leaf = best_leaf(tree, costs)
-            return leaf, (), float(costs[leaf])
-        leaf, particles = self._swarm.choose(tree, costs, self._generator)
-        return leaf, particles, float(costs[leaf])
+            leaf, cost = best_leaf(tree, self.robot, self.settings)
+            return leaf, (), cost
+        return self._swarm.choose(tree, self._generator)
 
 
 def _told(error: Exception) -> str:

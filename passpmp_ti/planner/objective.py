@@ -1,12 +1,11 @@
-"""What a plan costs: eqs. 5, 8, 18 and 19."""
+"""What a plan costs: eqs. 5, 8, 18 and 19. A leaf's: see kernels/objective.py."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from passpmp_ti.kernels.tree import CHILDREN
+from passpmp_ti.grid.model import TICK
 from passpmp_ti.planner.guide import GuideField, mean_cost
-from passpmp_ti.planner.tree import Tree
 from passpmp_ti.robots import Robot
 from passpmp_ti.settings import Settings
 from passpmp_ti.trajectory import Trajectory
@@ -20,28 +19,15 @@ def horizon(settings: Settings, robot: Robot) -> float:
     return settings.cycle + sum(settings.primitives) + robot.longest_braking
 
 
-def leaf_costs(tree: Tree, settings: Settings) -> np.ndarray:
-    """f of eq. 5 for the plan that ends at each leaf.
-
-    w_ps is 1 for every plan of the tree: all its nodes are proven p-safe (eq. 8). A node that is
-    not a leaf costs infinitely much: no plan ends there.
-
-    Returns:
-        [n] float32, one a node.
-    """
-    elapsed = tree.elapsed
-    cost = tree.cost.astype(np.float64)
-    if settings.distance == "final":
-        distance = cost[:, 1]
-    else:
-        # what is held is the plan and its braking, and rest after it: judged over one time for all
-        span = horizon(settings, tree.model.robot)
-        rest = np.maximum(span - elapsed - cost[:, 4], 0.0)
-        distance = (cost[:, 0] + cost[:, 2] + rest * cost[:, 3]) / span
-        elapsed = np.full(tree.count, span)
-    f = settings.weight_distance * distance + settings.weight_time * elapsed
-    f[tree.link[:, CHILDREN] != 0] = np.inf
-    return f.astype(np.float32)
+def objective_numbers(settings: Settings, robot: Robot) -> np.ndarray:
+    """[5] float32, what `kernels.objective.plan_cost` is told; see there."""
+    final = settings.distance == "final"
+    return np.array(
+        (
+            settings.weight_distance, settings.weight_time, horizon(settings, robot), final, TICK,
+        ),
+        dtype=np.float32,
+    )  # fmt: skip
 
 
 def trajectory_cost(
