@@ -66,13 +66,13 @@ FIELDS = [a_field(seed) for seed in range(6)] + [spiral()]
 CORNERS = [(0, 0), (0, 82), (60, 0), (60, 82)]
 
 
-@pytest.mark.parametrize("slowness, goal", FIELDS + [(a_field(9)[0], c) for c in CORNERS])
+@pytest.mark.parametrize(("slowness", "goal"), FIELDS + [(a_field(9)[0], c) for c in CORNERS])
 def test_one_thread_finds_the_fixed_point(slowness, goal):
     wanted = plainly(slowness, goal)
     assert solved(slowness, goal) == pytest.approx(wanted, rel=1e-3, abs=1e-4)
 
 
-@pytest.mark.parametrize("slowness, goal", FIELDS + [(a_field(9)[0], c) for c in CORNERS[:2]])
+@pytest.mark.parametrize(("slowness", "goal"), FIELDS + [(a_field(9)[0], c) for c in CORNERS[:2]])
 def test_many_threads_find_the_same_and_always_the_same_bytes(slowness, goal):
     one = solved(slowness, goal)
     with device.forced():

@@ -14,7 +14,7 @@ SETTLED = 5e-4  # share of its slowness by which a cell's time must fall to coun
 
 RUN = 16  # cells in a row that one thread lays out
 TILE = 8  # cells along a side of what one thread relaxes
-TURNS = 8  # turns of both colours in one launch
+TURNS = 16  # in one launch; an even number
 
 Field = ti.types.ndarray(dtype=ti.f32, ndim=2)  # [J, I]
 Whole = ti.types.ndarray(dtype=ti.i32, ndim=2)
@@ -78,6 +78,55 @@ def include(span: ti.template(), j, first, last):
         span[j, 1] = ti.max(span[j, 1], last)
 
 
+@ti.func
+def sweep_row(
+    slowness: ti.template(), time: ti.template(), span: ti.template(), j, first, last, step
+):
+    """Look at a row's cells from `first` to `last`, from the left for step 1, from the right for
+    -1, and on as long as times fall; whether one did."""
+    rows, columns = time.shape[0], time.shape[1]
+    # at the border a cell stands for its own neighbour, which tells it nothing
+    below = ti.max(j - 1, 0)
+    above = ti.min(j + 1, rows - 1)
+    i = first
+    if step < 0:
+        i = last
+    left = last - first + 1
+    behind = time[j, ti.min(ti.max(i - step, 0), columns - 1)]
+    # what has to be looked at again of this row, the one below and the one above
+    least = ti.Vector([columns, columns, columns])
+    most = ti.Vector([-1, -1, -1])
+    fell = False
+    while left > 0:
+        ahead = time[j, ti.min(ti.max(i + step, 0), columns - 1)]
+        under = time[below, i]
+        over = time[above, i]
+        old = time[j, i]
+        new = fallen(old, ti.min(behind, ahead), ti.min(under, over), slowness[j, i])
+        left -= 1
+        if new < old:
+            fell = True
+            time[j, i] = new
+            # only what is later can hear of it; what lies ahead comes next
+            if behind > new:
+                least[0] = ti.min(least[0], i - step)
+                most[0] = ti.max(most[0], i - step)
+            if under > new:
+                least[1] = ti.min(least[1], i)
+                most[1] = ti.max(most[1], i)
+            if over > new:
+                least[2] = ti.min(least[2], i)
+                most[2] = ti.max(most[2], i)
+            if left == 0 and i + step >= 0 and i + step < columns:
+                left = 1
+        behind = new
+        i += step
+    include(span, j, least[0], most[0])
+    include(span, below, least[1], most[1])
+    include(span, above, least[2], most[2])
+    return fell
+
+
 @ti.kernel
 def sweep(
     # in
@@ -110,58 +159,19 @@ def sweep(
                 j = jj
                 if sweeps % 2 == 1:
                     j = rows - 1 - jj
-                # at the border a cell stands for its own neighbour, which tells it nothing
-                below = ti.max(j - 1, 0)
-                above = ti.min(j + 1, rows - 1)
                 for way in range(2):
                     first = span[j, 0]
                     last = ti.min(span[j, 1], columns - 1)
-                    # at first times grow away from the goal's column, as a rule: spread from there
-                    kept = first
-                    if sweeps < 2 and way == 0 and first < goal_i:
-                        first = goal_i
-                    if first <= last:
+                    start = first
+                    # at first times grow away from the goal's column, as a rule
+                    if sweeps < 2 and way == 0:
+                        start = ti.max(first, goal_i)
+                    if start <= last:
                         span[j, 0] = columns
                         span[j, 1] = -1
-                        include(span, j, kept, first - 1)
-                        step = 1 - 2 * way
-                        i = first
-                        if way == 1:
-                            i = last
-                        left = last - first + 1
-                        behind = time[j, ti.min(ti.max(i - step, 0), columns - 1)]
-                        # of this row, the one below and the one above
-                        least = ti.Vector([columns, columns, columns])
-                        most = ti.Vector([-1, -1, -1])
-                        while left > 0:
-                            ahead = time[j, ti.min(ti.max(i + step, 0), columns - 1)]
-                            under = time[below, i]
-                            over = time[above, i]
-                            old = time[j, i]
-                            new = fallen(
-                                old, ti.min(behind, ahead), ti.min(under, over), slowness[j, i]
-                            )
-                            left -= 1
-                            if new < old:
-                                busy = True
-                                time[j, i] = new
-                                # only what is later can hear of it; what lies ahead comes next
-                                if behind > new:
-                                    least[0] = ti.min(least[0], i - step)
-                                    most[0] = ti.max(most[0], i - step)
-                                if under > new:
-                                    least[1] = ti.min(least[1], i)
-                                    most[1] = ti.max(most[1], i)
-                                if over > new:
-                                    least[2] = ti.min(least[2], i)
-                                    most[2] = ti.max(most[2], i)
-                                if left == 0 and i + step >= 0 and i + step < columns:
-                                    left = 1
-                            behind = new
-                            i += step
-                        include(span, j, least[0], most[0])
-                        include(span, below, least[1], most[1])
-                        include(span, above, least[2], most[2])
+                        include(span, j, first, start - 1)
+                        if sweep_row(slowness, time, span, j, start, last, 1 - 2 * way):
+                            busy = True
             sweeps += 1
     return sweeps
 
@@ -209,18 +219,17 @@ def stirred_about(stirred: ti.template(), tile_j, tile_i):
 def relax(
     # in
     slowness: Field,  # [J, I]
-    turn: ti.i32,  # counts the turns, from 2 on
+    turn: ti.i32,  # number of the first turn of this launch; 2 as it begins
     # in / out
     time: Field,  # [J, I] as `lay_out` leaves it
     stirred: Whole,  # [tiles] the turn in which each changed last; 1 everywhere as it begins
 ) -> ti.i32:
-    """Relax the tiles, every other one in turn, as on a chessboard; returns how many are not
-    settled.
+    """Relax the tiles, black ones and white ones in turn; returns how many are not settled.
 
     Tiles of one colour share no edge, and cells read only across edges: the order in which threads
     come to them does not matter.
     """
-    for t in ti.static(range(2 * TURNS)):
+    for t in ti.static(range(TURNS)):
         for tile_j, tile_i in stirred:
             if (tile_j + tile_i + t) % 2 == 0:
                 # a turn ago its neighbours may have changed, two turns ago the tile itself
@@ -229,7 +238,7 @@ def relax(
                         stirred[tile_j, tile_i] = turn + t
     unsettled = 0
     for tile_j, tile_i in stirred:
-        if stirred[tile_j, tile_i] >= turn + 2 * TURNS - 2:
+        if stirred[tile_j, tile_i] >= turn + TURNS - 2:
             unsettled += 1
     return unsettled
 

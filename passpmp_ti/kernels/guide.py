@@ -59,6 +59,7 @@ def guide_costs(
     # out
     cost: ti.types.ndarray(dtype=ti.f32, ndim=1),  # [N]
 ):
+    ti.loop_config(parallelize=1)  # they are few: a second thread would cost more than it saves
     for n in range(places.shape[0]):
         cost[n] = guide_at(
             time, ahead, frame, places[n, 0], places[n, 1], places[n, 2], places[n, 3]

@@ -19,7 +19,7 @@ from passpmp_ti.settings import Settings
 
 MOST_CELLS = 35_000
 """Cells of the guide's grid: it is solved every cycle."""
-CELL_SHARE = 0.25
+CELL_SHARE = 0.125
 """Of the robot's disc, the side of a cell at least: finer ones tell it nothing."""
 SLOWEST_SHARE = 1 / 12
 """Of the cruise speed, where something may step out at any moment."""
@@ -28,9 +28,9 @@ WALL_SHARE = 1 / 300
 MOST_SWEEPS = 24
 MOST_LAUNCHES = 40
 """Of the parallel solver, `TURNS` turns each."""
-AROUND = 36
+AROUND = 40
 """Cells about the robot in which the way ahead is worked out."""
-AHEAD = 8
+AHEAD = 10
 """Cells down the field at which the way ahead is read."""
 
 
@@ -193,7 +193,7 @@ def solve(slowness: device.Array, goal: tuple[int, int], time: device.Array) -> 
     tiles = (-(-rows // TILE), -(-columns // TILE))
     stirred = device.put(np.ones(tiles, dtype=np.int32))
     for launch in range(MOST_LAUNCHES):
-        if relax(slowness, 2 + 2 * TURNS * launch, time, stirred) == 0:
+        if relax(slowness, 2 + TURNS * launch, time, stirred) == 0:
             return
 
 
