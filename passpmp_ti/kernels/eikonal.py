@@ -29,11 +29,10 @@ def fallen(old, a, b, slowness):
     result = old
     # almost all cells that are asked stay as they are: that is told without a root
     if da * da + db * db > slowness * slowness:
-        low = ti.min(a, b)
-        apart = ti.max(a, b) - low
-        t = low + slowness
-        if apart < slowness:
-            t = low + 0.5 * (apart + ti.sqrt(2.0 * slowness * slowness - apart * apart))
+        apart = a - b
+        t = ti.min(a, b) + slowness
+        if ti.abs(apart) < slowness:
+            t = 0.5 * (a + b + ti.sqrt(2.0 * slowness * slowness - apart * apart))
         if t < most:
             result = t
     return result

@@ -100,7 +100,5 @@ def _empty(seen: np.ndarray, squares: np.ndarray) -> int:
     if len(squares) < FEWEST:
         return 0  # too few to matter
     empty = device.empty((len(squares),), np.int32)
-    squares_empty(
-        device.put(seen.view(np.uint8)), device.put(squares.astype(np.int32)), empty
-    )
+    squares_empty(device.put(seen.view(np.uint8)), device.put(squares.astype(np.int32)), empty)
     return int(device.host(empty).sum())
