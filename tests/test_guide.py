@@ -6,7 +6,8 @@ from oracle import exact
 
 from passpmp_ti import DifferentialDrive, FutureModel, Settings, device
 from passpmp_ti.kernels.eikonal import UNREACHED
-from passpmp_ti.planner.guide import Guide, solve
+from passpmp_ti.planner.eikonal import solve
+from passpmp_ti.planner.guide import Guide
 
 ROBOT = DifferentialDrive()
 SETTINGS = Settings(cell=0.05, object_width=0.4, object_speed=1.0)

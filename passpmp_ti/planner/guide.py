@@ -8,12 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from passpmp_ti import device
-from passpmp_ti.grid.distance import distance_to_zeros
 from passpmp_ti.grid.model import FutureModel
 from passpmp_ti.grid.static_map import StaticMap
-from passpmp_ti.kernels.distance import column_distance, row_distance
-from passpmp_ti.kernels.eikonal import TILE, TURNS, lay_out, point_ahead, relax, sweep
+from passpmp_ti.kernels.eikonal import lay_out, point_ahead
 from passpmp_ti.kernels.guide import guide_costs
+from passpmp_ti.planner.eikonal import distances_to_zeros, solve
 from passpmp_ti.robots import Robot
 from passpmp_ti.settings import Settings
 
@@ -25,9 +24,6 @@ SLOWEST_SHARE = 1 / 12
 """Of the cruise speed, where something may step out at any moment."""
 WALL_SHARE = 1 / 300
 """Of the cruise speed, inside walls: finite, so that every place has a way down."""
-MOST_SWEEPS = 24
-MOST_LAUNCHES = 40
-"""Of the parallel solver, `TURNS` turns each."""
 AROUND = 40
 """Cells about the robot in which the way ahead is worked out."""
 AHEAD = 10
@@ -136,7 +132,7 @@ class Guide:
         """[J, I] float32 [cells] to the nearest wall, and to where something may step out from."""
         met = self._mark(self._walls, _centres(model, model.static) - np.array(self.anchor))
         if met or self._to_wall is None:
-            self._to_wall = _distance(self._walls)
+            self._to_wall = distances_to_zeros(self._walls)
         if self._settings.object_speed <= 0:
             return self._to_wall, self._to_wall  # the second is not read
         corners = np.ones(self._walls.shape, dtype=np.uint8)
@@ -144,7 +140,7 @@ class Guide:
         if self._settings.guide_movers:
             # where they are now: nose to somebody who stands, a robot cannot even turn
             self._mark(corners, _centres(model, model.movable) - np.array(self.anchor))
-        return self._to_wall, _distance(corners)
+        return self._to_wall, distances_to_zeros(corners)
 
     def _lay_out_numbers(self) -> np.ndarray:
         """[6] float32 that `lay_out` reads.
@@ -176,36 +172,6 @@ class Guide:
         new = bool(mask[j, i].any())
         mask[j, i] = 0
         return new
-
-
-def solve(slowness: device.Array, goal: tuple[int, int], time: device.Array) -> None:
-    """Work out the time to the goal, by one thread on the CPU and by many elsewhere.
-
-    Args:
-        slowness: [J, I] float32 [s] to cross a cell.
-        goal: its cell (j, i).
-        time: [J, I] float32 [s]; 0 at the goal and UNREACHED elsewhere, solved in place.
-    """
-    rows, columns = time.shape
-    if not device.resident():
-        sweep(slowness, *goal, MOST_SWEEPS, time, np.empty((rows, 2), dtype=np.int32))
-        return
-    tiles = (-(-rows // TILE), -(-columns // TILE))
-    stirred = device.put(np.ones(tiles, dtype=np.int32))
-    for launch in range(MOST_LAUNCHES):
-        if relax(slowness, 2 + TURNS * launch, time, stirred) == 0:
-            return
-
-
-def _distance(mask: np.ndarray) -> device.Array:
-    """[J, I] float32 [cells] to the nearest cell that is 0, where the kernels read it."""
-    if not device.resident():
-        return distance_to_zeros(mask)
-    column = device.empty(mask.shape, np.int32)
-    distance = device.empty(mask.shape, np.float32)
-    column_distance(device.put(mask), column)
-    row_distance(column, distance)
-    return distance
 
 
 def _centres(model: FutureModel, marked: np.ndarray) -> np.ndarray:
