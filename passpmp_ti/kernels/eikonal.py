@@ -16,6 +16,7 @@ RUN = 16  # cells in a row that one thread lays out
 
 Field = ti.types.ndarray(dtype=ti.f32, ndim=2)  # [J, I]
 Whole = ti.types.ndarray(dtype=ti.i32, ndim=2)
+Mask = ti.types.ndarray(dtype=ti.u8, ndim=2)
 
 
 @ti.func
@@ -37,10 +38,29 @@ def fallen(old, a, b, slowness):
 
 
 @ti.kernel
+def block(
+    # in
+    cells: Whole,  # [N, 2] row and column of walls
+    reach: ti.f32,  # cells from a wall in which the robot cannot be
+    # in / out
+    blocked: Mask,  # [J, I] 1: near a wall
+):
+    span = ti.cast(reach, ti.i32) + 1
+    ti.loop_config(parallelize=1)  # those that are new in a cycle are few
+    for n in range(cells.shape[0]):
+        for dj, di in ti.ndrange((-span, span + 1), (-span, span + 1)):
+            j = cells[n, 0] + dj
+            i = cells[n, 1] + di
+            if j >= 0 and i >= 0 and j < blocked.shape[0] and i < blocked.shape[1]:
+                if ti.sqrt(ti.cast(dj * dj + di * di, ti.f32)) < reach:
+                    blocked[j, i] = ti.u8(1)  # whoever else writes here writes the same
+
+
+@ti.kernel
 def lay_out(
     # in
-    numbers: ti.types.ndarray(dtype=ti.f32, ndim=1),  # [6], see below
-    to_wall: Field,  # [J, I] cells
+    numbers: ti.types.ndarray(dtype=ti.f32, ndim=1),  # [5], see below
+    blocked: Mask,  # [J, I] 1: near a wall
     to_corner: Field,  # [J, I] cells to where something may step out from
     goal_j: ti.i32,
     goal_i: ti.i32,
@@ -50,17 +70,16 @@ def lay_out(
 ):
     """The speed that will be safe at each place, as the time to cross it.
 
-    numbers: 0 cells from a wall in which the robot cannot be; speeds [cells/s]: 1 there, 2 the
-    slowest elsewhere, 3 the cruise speed; 4 speed that each cell farther from a corner allows, 5
-    what is to be taken off that.
+    numbers: speeds [cells/s]: 0 near a wall, 1 the slowest elsewhere, 2 the cruise speed, 3 what
+    each cell farther from a corner allows, 4 what is to be taken off that.
     """
     rows, columns = time.shape[0], time.shape[1]
     for j, run in ti.ndrange(rows, (columns + RUN - 1) // RUN):
         for i in range(run * RUN, ti.min(run * RUN + RUN, columns)):
-            speed = numbers[4] * to_corner[j, i] - numbers[5]
-            speed = ti.min(ti.max(speed, numbers[2]), numbers[3])
-            if to_wall[j, i] < numbers[0]:
-                speed = numbers[1]
+            speed = numbers[3] * to_corner[j, i] - numbers[4]
+            speed = ti.min(ti.max(speed, numbers[1]), numbers[2])
+            if blocked[j, i] != 0:
+                speed = numbers[0]
             slowness[j, i] = 1.0 / speed
             time[j, i] = UNREACHED
             if j == goal_j and i == goal_i:

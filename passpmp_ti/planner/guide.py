@@ -10,7 +10,7 @@ import numpy as np
 from passpmp_ti import device
 from passpmp_ti.grid.model import FutureModel
 from passpmp_ti.grid.static_map import StaticMap
-from passpmp_ti.kernels.eikonal import lay_out, point_ahead
+from passpmp_ti.kernels.eikonal import block, lay_out, point_ahead
 from passpmp_ti.kernels.guide import guide_costs
 from passpmp_ti.planner.eikonal import distances_to_zeros, solve
 from passpmp_ti.robots import Robot
@@ -84,12 +84,12 @@ class Guide:
         )
         columns, rows = (int(n) for n in np.ceil(extent / self._cell) + 1)
         self._walls = np.ones((rows, columns), dtype=np.uint8)
-        self._to_wall: device.Array | None = None
+        self._blocked = device.put(np.zeros((rows, columns), dtype=np.uint8))
         self._slowness = device.empty((rows, columns), np.float32)
         self._down = device.empty((rows, columns), np.int32)
         self._numbers = device.put(self._lay_out_numbers())
         if static_map is not None:
-            self._mark(self._walls, _map_points(static_map) - np.array(anchor))
+            self._meet(_map_points(static_map))
 
     def field(
         self, model: FutureModel, goal: tuple[float, float], position: np.ndarray
@@ -113,9 +113,9 @@ class Guide:
         rows, columns = self._walls.shape
         j = int(np.clip((local_goal[1] - self._low[1]) / self._cell, 0, rows - 1))
         i = int(np.clip((local_goal[0] - self._low[0]) / self._cell, 0, columns - 1))
-        to_wall, to_corner = self._distances(model)
+        self._meet(_centres(model, model.static))
         time = device.empty((rows, columns), np.float32)
-        lay_out(self._numbers, to_wall, to_corner, j, i, self._slowness, time)
+        lay_out(self._numbers, self._blocked, self._to_corner(model), j, i, self._slowness, time)
         solve(self._slowness, (j, i), time)
         here = (np.asarray(position) - np.array(self.anchor) - self._low) / self._cell
         low = np.clip(np.floor(here - AROUND), 0, None).astype(int)
@@ -128,22 +128,30 @@ class Guide:
             ahead = device.put(np.zeros((1, 1, 2), dtype=np.float32))
         return GuideField(time, ahead, device.put(frame), self.anchor)
 
-    def _distances(self, model: FutureModel) -> tuple[device.Array, device.Array]:
-        """[J, I] float32 [cells] to the nearest wall, and to where something may step out from."""
-        met = self._mark(self._walls, _centres(model, model.static) - np.array(self.anchor))
-        if met or self._to_wall is None:
-            self._to_wall = distances_to_zeros(self._walls)
-        if self._settings.object_speed <= 0:
-            return self._to_wall, self._to_wall  # the second is not read
+    def _meet(self, walls: np.ndarray) -> None:
+        """Remember walls at world points [n, 2]."""
+        j, i = self._cells(walls)
+        new = np.flatnonzero(self._walls[j, i])
+        if not len(new):
+            return
+        cells = np.stack([j[new], i[new]], axis=1).astype(np.int32)
+        self._walls[cells[:, 0], cells[:, 1]] = 0
+        settings = self._settings
+        # the model keeps up to a cell more from a wall than the clearance
+        kept = (settings.clearance(self._robot) + settings.cell) / self._cell + 0.5
+        block(device.put(cells), kept, self._blocked)
+
+    def _to_corner(self, model: FutureModel) -> device.Array:
+        """[J, I] float32 [cells] to the nearest place that something may step out from."""
         corners = np.ones(self._walls.shape, dtype=np.uint8)
-        self._mark(corners, _centres(model, model.standing_sources) - np.array(self.anchor))
+        corners[self._cells(_centres(model, model.standing_sources))] = 0
         if self._settings.guide_movers:
             # where they are now: nose to somebody who stands, a robot cannot even turn
-            self._mark(corners, _centres(model, model.movable) - np.array(self.anchor))
-        return self._to_wall, distances_to_zeros(corners)
+            corners[self._cells(_centres(model, model.movable))] = 0
+        return distances_to_zeros(corners)
 
     def _lay_out_numbers(self) -> np.ndarray:
-        """[6] float32 that `lay_out` reads.
+        """[5] float32 that `lay_out` reads.
 
         What can step out from behind a standing thing at distance d leaves (d - lost) / v_b seconds
         to brake, less the cycle and the first primitive: v = a (...).
@@ -156,22 +164,17 @@ class Guide:
             gain = robot.deceleration / settings.object_speed
             loss = gain * lost / cell + robot.deceleration * 2 * settings.cycle / cell
         return np.array(
-            [
-                # the model keeps up to a cell more from a wall than the clearance
-                lost / cell + 0.5, WALL_SHARE * cruise, SLOWEST_SHARE * cruise, cruise, gain, loss,
-            ],
-            dtype=np.float32,
-        )  # fmt: skip
+            [WALL_SHARE * cruise, SLOWEST_SHARE * cruise, cruise, gain, loss], dtype=np.float32
+        )
 
-    def _mark(self, mask: np.ndarray, local: np.ndarray) -> bool:
-        """Put zeros where the local points [n, 2] fall; whether any is new."""
-        cells = np.floor((local - self._low) / self._cell).astype(int)
-        rows, columns = mask.shape
+    def _cells(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """(rows, columns) of the cells that hold world points [n, 2]; without those outside."""
+        offset = np.array(self.anchor) + self._low
+        cells = np.floor((points - offset) / self._cell).astype(int)
+        rows, columns = self._walls.shape
         inside = (cells >= 0).all(axis=1) & (cells[:, 0] < columns) & (cells[:, 1] < rows)
         i, j = cells[inside].T
-        new = bool(mask[j, i].any())
-        mask[j, i] = 0
-        return new
+        return j, i
 
 
 def _centres(model: FutureModel, marked: np.ndarray) -> np.ndarray:
