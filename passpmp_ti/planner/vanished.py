@@ -88,7 +88,9 @@ def vanished(before: FutureModel, now: FutureModel, *, timeless: bool = False) -
         i, j = i[inside], j[inside]
         asked += len(i)
         passed = now.seen[j, i]  # most are not: that is quick to ask
-        squares.append(np.stack([j, i, np.full(len(i), reach)], axis=1)[passed])
+        if passed.any():
+            j, i = j[passed], i[passed]
+            squares.append(np.stack([j, i, np.full(len(i), reach)], axis=1))
     gone = _empty(now.seen, np.concatenate(squares)) if squares else 0
     if gone >= FEWEST and gone >= LEAST_SHARE * asked:
         return f"{gone} of {asked} surfaces are gone that cannot be"
