@@ -261,7 +261,8 @@ def test_a_scan_that_comes_late_is_planned_with_while_it_is_news():
     then = held.at(late) if held.start <= late else None
     assert then is None  # what is held begins after that scan: the road before it is remembered
     navigator.update(scan_at(state, stamp), state)
-    middle = navigator.held.at(stamp + 0.6 * CYCLE)
+    # a plan chosen just now begins at the cycle's end: until then what was held is followed
+    middle = held.at(stamp + 0.6 * CYCLE)
     navigator.update(scan_at(middle, stamp + 0.6 * CYCLE), middle)
     assert not navigator.record.lost_scan
     assert navigator.record.deviation < 0.01

@@ -117,27 +117,28 @@ def contradicted(
     broken: ti.types.ndarray(dtype=ti.i32, ndim=1),  # [N]
 ):
     """A return inside a disc that memory says nothing can have reached yet."""
+    span = ti.cast(radius / cell, ti.i32) + 1
     for n in range(points.shape[0]):
         x = points[n, 0]
         y = points[n, 1]
-        span = ti.cast(radius / cell, ti.i32) + 1
         ci = ti.cast(ti.floor(x / cell), ti.i32)
         cj = ti.cast(ti.floor(y / cell), ti.i32)
+        first = ti.max(ci - span - corner_i, 0)
+        last = ti.min(ci + span - corner_i, remembered.shape[1] - 1)
+        j = ti.max(cj - span - corner_j, 0)
+        last_j = ti.min(cj + span - corner_j, remembered.shape[0] - 1)
         found = 0
-        for dj in range(-span, span + 1):
-            for di in range(-span, span + 1):
-                dx = ti.abs((ci + di + 0.5) * cell - x)
-                dy = ti.abs((cj + dj + 0.5) * cell - y)
-                i = ci + di - corner_i
-                j = cj + dj - corner_j
-                if (
-                    dx * dx + dy * dy < radius * radius
-                    and i >= 0
-                    and j >= 0
-                    and i < remembered.shape[1]
-                    and j < remembered.shape[0]
-                ):
-                    # later than now by more than a tick: not yet reachable, yet somebody is there
-                    if ti.cast(remembered[j, i], ti.i32) > age + 2:
-                        found = 1
+        while found == 0 and j <= last_j:
+            latest = 0
+            for i in range(first, last + 1):
+                latest = ti.max(latest, ti.cast(remembered[j, i], ti.i32))
+            # later than now by more than a tick: not yet reachable, yet somebody is there
+            if latest > age + 2:
+                dy = ti.abs((j + corner_j + 0.5) * cell - y)
+                for i in range(first, last + 1):
+                    dx = ti.abs((i + corner_i + 0.5) * cell - x)
+                    if dx * dx + dy * dy < radius * radius:
+                        if ti.cast(remembered[j, i], ti.i32) > age + 2:
+                            found = 1
+            j += 1
         broken[n] = found

@@ -7,23 +7,26 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from passpmp_ti.grid.distance import distance_to_zeros
+from passpmp_ti import device
 from passpmp_ti.grid.model import FutureModel
 from passpmp_ti.grid.static_map import StaticMap
-from passpmp_ti.kernels.guide import UNREACHED, guide_costs, point_ahead, sweep
+from passpmp_ti.kernels.eikonal import block, lay_out, point_ahead
+from passpmp_ti.kernels.guide import guide_costs
+from passpmp_ti.planner.eikonal import distances_to_zeros, solve
 from passpmp_ti.robots import Robot
 from passpmp_ti.settings import Settings
 
-MOST_CELLS = 70_000
-"""Cells of the guide's grid: it is swept every cycle."""
+MOST_CELLS = 35_000
+"""Cells of the guide's grid: it is solved every cycle."""
+CELL_SHARE = 0.125
+"""Of the robot's disc, the side of a cell at least: finer ones tell it nothing."""
 SLOWEST_SHARE = 1 / 12
 """Of the cruise speed, where something may step out at any moment."""
 WALL_SHARE = 1 / 300
 """Of the cruise speed, inside walls: finite, so that every place has a way down."""
-MOST_ROUNDS = 12
-AROUND = 56
+AROUND = 40
 """Cells about the robot in which the way ahead is worked out."""
-AHEAD = 14
+AHEAD = 10
 """Cells down the field at which the way ahead is read."""
 
 
@@ -31,24 +34,25 @@ AHEAD = 14
 class GuideField:
     """Cost to go over the plane, as the tree's kernels read it."""
 
-    time: np.ndarray
+    time: device.Array
     """[J, I] float32: seconds to the goal from each cell's centre."""
-    ahead: np.ndarray
+    ahead: device.Array
     """[j, i, 2] float32: unit vectors along the way down, about the robot."""
-    frame: np.ndarray
+    frame: device.Array
     """[11] float32, see kernels/guide.py."""
     anchor: tuple[float, float]
 
     def at(self, states: np.ndarray) -> np.ndarray:
         """[n] cost to go from states [n, 5]: seconds, or metres for the straight guide."""
-        cost = np.empty(len(states), dtype=np.float32)
-        if len(states):
-            places = np.empty((len(states), 4), dtype=np.float32)
-            places[:, :2] = states[:, :2] - np.array(self.anchor)
-            places[:, 2] = np.cos(states[:, 2])
-            places[:, 3] = np.sin(states[:, 2])
-            guide_costs(self.time, self.ahead, self.frame, places, cost)
-        return cost.astype(np.float64)
+        if not len(states):
+            return np.zeros(0)
+        places = np.empty((len(states), 4), dtype=np.float32)
+        places[:, :2] = states[:, :2] - np.array(self.anchor)
+        places[:, 2] = np.cos(states[:, 2])
+        places[:, 3] = np.sin(states[:, 2])
+        cost = device.empty((len(states),), np.float32)
+        guide_costs(self.time, self.ahead, self.frame, device.put(places), cost)
+        return device.host(cost).astype(np.float64)
 
 
 class Guide:
@@ -73,11 +77,19 @@ class Guide:
         pad = 0.4 * sensor_reach
         self._low = places.min(axis=0) - pad
         extent = places.max(axis=0) + pad - self._low
-        self._cell = max(settings.cell, math.sqrt(float(extent.prod()) / MOST_CELLS))
+        self._cell = max(
+            settings.cell,
+            CELL_SHARE * robot.disc_radius,
+            math.sqrt(float(extent.prod()) / MOST_CELLS),
+        )
         columns, rows = (int(n) for n in np.ceil(extent / self._cell) + 1)
         self._walls = np.ones((rows, columns), dtype=np.uint8)
+        self._blocked = device.put(np.zeros((rows, columns), dtype=np.uint8))
+        self._slowness = device.empty((rows, columns), np.float32)
+        self._down = device.empty((rows, columns), np.int32)
+        self._numbers = device.put(self._lay_out_numbers())
         if static_map is not None:
-            self._mark(self._walls, _map_points(static_map) - np.array(anchor))
+            self._meet(_map_points(static_map))
 
     def field(
         self, model: FutureModel, goal: tuple[float, float], position: np.ndarray
@@ -95,54 +107,74 @@ class Guide:
         if self._settings.guide == "euclidean":
             frame[5] = 1
             nothing = np.zeros((2, 2, 2), dtype=np.float32)
-            return GuideField(nothing[0], nothing, frame, self.anchor)
-        self._mark(self._walls, _centres(model, model.static) - np.array(self.anchor))
-        time = np.full(self._walls.shape, UNREACHED, dtype=np.float32)
-        rows, columns = time.shape
+            return GuideField(
+                device.put(nothing[0]), device.put(nothing), device.put(frame), self.anchor
+            )
+        rows, columns = self._walls.shape
         j = int(np.clip((local_goal[1] - self._low[1]) / self._cell, 0, rows - 1))
         i = int(np.clip((local_goal[0] - self._low[0]) / self._cell, 0, columns - 1))
-        time[j, i] = 0.0
-        sweep((self._cell / self._speed(model)).astype(np.float32), MOST_ROUNDS, time)
+        self._meet(_centres(model, model.static))
+        time = device.empty((rows, columns), np.float32)
+        lay_out(self._numbers, self._blocked, self._to_corner(model), j, i, self._slowness, time)
+        solve(self._slowness, (j, i), time)
         here = (np.asarray(position) - np.array(self.anchor) - self._low) / self._cell
         low = np.clip(np.floor(here - AROUND), 0, None).astype(int)
         high = np.minimum(np.ceil(here + AROUND), (columns, rows)).astype(int)
         frame[8:10] = low
-        ahead = np.zeros((*np.maximum(high - low, 1)[::-1], 2), dtype=np.float32)
         if (high > low).all():
-            point_ahead(time, AHEAD, int(low[1]), int(low[0]), ahead)
-        return GuideField(time, ahead, frame, self.anchor)
+            ahead = device.empty((int(high[1] - low[1]), int(high[0] - low[0]), 2), np.float32)
+            point_ahead(time, AHEAD, int(low[1]), int(low[0]), self._down, ahead)
+        else:
+            ahead = device.put(np.zeros((1, 1, 2), dtype=np.float32))
+        return GuideField(time, ahead, device.put(frame), self.anchor)
 
-    def _speed(self, model: FutureModel) -> np.ndarray:
-        """[J, I] speed that will be safe at each place [m/s].
-
-        What can step out from behind a standing thing at distance d leaves (d - clearance) / v_b
-        seconds to brake, less the cycle and the first primitive: v = a (...).
-        """
-        settings, robot = self._settings, self._robot
-        cruise = self._cruise
-        clearance = settings.clearance(robot)
-        speed = np.full(self._walls.shape, cruise)
-        corners = np.ones(self._walls.shape, dtype=np.uint8)
-        self._mark(corners, _centres(model, model.standing_sources) - np.array(self.anchor))
-        if settings.guide_movers:
-            # where they are now: nose to somebody who stands, a robot cannot even turn
-            self._mark(corners, _centres(model, model.movable) - np.array(self.anchor))
-        if settings.object_speed > 0 and not corners.all():
-            room = distance_to_zeros(corners) * self._cell - clearance - settings.cell
-            spare = room / settings.object_speed - 2 * settings.cycle
-            speed = np.clip(robot.deceleration * spare, SLOWEST_SHARE * cruise, cruise)
+    def _meet(self, walls: np.ndarray) -> None:
+        """Remember walls at world points [n, 2]."""
+        j, i = self._cells(walls)
+        new = np.flatnonzero(self._walls[j, i])
+        if not len(new):
+            return
+        cells = np.stack([j[new], i[new]], axis=1).astype(np.int32)
+        self._walls[cells[:, 0], cells[:, 1]] = 0
+        settings = self._settings
         # the model keeps up to a cell more from a wall than the clearance
-        kept = clearance + settings.cell + 0.5 * self._cell
-        blocked = distance_to_zeros(self._walls) * self._cell < kept
-        speed[blocked] = WALL_SHARE * cruise
-        return speed
+        kept = (settings.clearance(self._robot) + settings.cell) / self._cell + 0.5
+        block(device.put(cells), kept, self._blocked)
 
-    def _mark(self, mask: np.ndarray, local: np.ndarray) -> None:
-        """Put zeros where the local points [n, 2] fall."""
-        cells = np.floor((local - self._low) / self._cell).astype(int)
-        rows, columns = mask.shape
+    def _to_corner(self, model: FutureModel) -> device.Array:
+        """[J, I] float32 [cells] to the nearest place that something may step out from."""
+        corners = np.ones(self._walls.shape, dtype=np.uint8)
+        corners[self._cells(_centres(model, model.standing_sources))] = 0
+        if self._settings.guide_movers:
+            # where they are now: nose to somebody who stands, a robot cannot even turn
+            corners[self._cells(_centres(model, model.movable))] = 0
+        return distances_to_zeros(corners)
+
+    def _lay_out_numbers(self) -> np.ndarray:
+        """[5] float32 that `lay_out` reads.
+
+        What can step out from behind a standing thing at distance d leaves (d - lost) / v_b seconds
+        to brake, less the cycle and the first primitive: v = a (...).
+        """
+        settings, robot, cell = self._settings, self._robot, self._cell
+        lost = settings.clearance(robot) + settings.cell
+        cruise = self._cruise / cell
+        gain, loss = 0.0, -cruise
+        if settings.object_speed > 0:
+            gain = robot.deceleration / settings.object_speed
+            loss = gain * lost / cell + robot.deceleration * 2 * settings.cycle / cell
+        return np.array(
+            [WALL_SHARE * cruise, SLOWEST_SHARE * cruise, cruise, gain, loss], dtype=np.float32
+        )
+
+    def _cells(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """(rows, columns) of the cells that hold world points [n, 2]; without those outside."""
+        offset = np.array(self.anchor) + self._low
+        cells = np.floor((points - offset) / self._cell).astype(int)
+        rows, columns = self._walls.shape
         inside = (cells >= 0).all(axis=1) & (cells[:, 0] < columns) & (cells[:, 1] < rows)
-        mask[cells[inside, 1], cells[inside, 0]] = 0
+        i, j = cells[inside].T
+        return j, i
 
 
 def _centres(model: FutureModel, marked: np.ndarray) -> np.ndarray:

@@ -6,7 +6,9 @@ import math
 
 import numpy as np
 
+from passpmp_ti import device
 from passpmp_ti.grid.model import FutureModel
+from passpmp_ti.kernels.vanished import squares_empty
 
 FEWEST, LEAST_SHARE = 3, 0.05
 """Surfaces that must be gone before the scan is doubted, and their share of those asked about: a
@@ -72,9 +74,9 @@ def vanished(before: FutureModel, now: FutureModel, *, timeless: bool = False) -
     age = now.stamp - before.stamp + settings.stamp_error
     # both scans may be off, and a surface is known to a cell only
     margin = 2 * (settings.range_noise + settings.localisation_error) + 2 * now.cell
-    asked = gone = 0
+    asked = 0
+    squares = []
     shift = now.window.cells_to(before.window)
-    sums: np.ndarray | None = None
     for mask, speed in ((before.static, 0.0), (before.movable, settings.object_speed)):
         reach = math.ceil((speed * age + margin) / now.cell) + 1
         if reach > MOST_REACH or (timeless and speed > 0):
@@ -86,24 +88,19 @@ def vanished(before: FutureModel, now: FutureModel, *, timeless: bool = False) -
         i, j = i[inside], j[inside]
         asked += len(i)
         passed = now.seen[j, i]  # most are not: that is quick to ask
-        i, j = i[passed], j[passed]
-        if not len(i):
-            continue
-        if sums is None:
-            sums = _sums(now.seen)
-        low_i, high_i, low_j, high_j = i - reach, i + reach + 1, j - reach, j + reach + 1
-        empty = (
-            sums[high_j, high_i] - sums[low_j, high_i] - sums[high_j, low_i] + sums[low_j, low_i]
-        )
-        gone += int((empty == (2 * reach + 1) ** 2).sum())
+        if passed.any():
+            j, i = j[passed], i[passed]
+            squares.append(np.stack([j, i, np.full(len(i), reach)], axis=1))
+    gone = _empty(now.seen, np.concatenate(squares)) if squares else 0
     if gone >= FEWEST and gone >= LEAST_SHARE * asked:
         return f"{gone} of {asked} surfaces are gone that cannot be"
     return ""
 
 
-def _sums(seen: np.ndarray) -> np.ndarray:
-    """[J + 1, I + 1] how many cells are seen below and left of each corner."""
-    sums = np.zeros((seen.shape[0] + 1, seen.shape[1] + 1), dtype=np.int32)
-    np.cumsum(seen, axis=0, out=sums[1:, 1:])
-    np.cumsum(sums[1:, 1:], axis=1, out=sums[1:, 1:])
-    return sums
+def _empty(seen: np.ndarray, squares: np.ndarray) -> int:
+    """How many squares [n, 3] (row, column, cells to each side) are seen whole."""
+    if len(squares) < FEWEST:
+        return 0  # too few to matter
+    empty = device.empty((len(squares),), np.int32)
+    squares_empty(device.put(seen.view(np.uint8)), device.put(squares.astype(np.int32)), empty)
+    return int(device.host(empty).sum())
