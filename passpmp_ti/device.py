@@ -7,6 +7,8 @@ only `host` and `put` copy, and what stays between them never leaves the device.
 from __future__ import annotations
 
 import contextlib
+import ctypes
+import os
 from collections.abc import Iterator
 from typing import Any, TypeAlias
 
@@ -36,6 +38,8 @@ def forced() -> Iterator[None]:
         _forced = before
 
 
+UNKNOWN_MEMORY = 8 * 2**30
+"""What is assumed where nothing tells."""
 SHARE = 512
 """Indices of a parallel loop that Taichi hands to one thread of a CPU at a time."""
 
@@ -70,6 +74,20 @@ def put(values: np.ndarray) -> Array:
 def host(array: Array) -> np.ndarray:
     """`array` where NumPy reads it; on the CPU the very same array."""
     return array if isinstance(array, np.ndarray) else array.to_numpy()
+
+
+def memory() -> int:
+    """Bytes of memory where arrays live: the machine's, or the GPU's."""
+    if backend.running() == "cuda":
+        driver = ctypes.CDLL("libcuda.so.1")
+        total, gpu = ctypes.c_size_t(), ctypes.c_int()
+        if not driver.cuDeviceGet(ctypes.byref(gpu), 0) and not driver.cuDeviceTotalMem_v2(
+            ctypes.byref(total), gpu
+        ):
+            return total.value
+    if hasattr(os, "sysconf"):
+        return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    return UNKNOWN_MEMORY
 
 
 def _taichi_type(dtype: Any) -> Any:

@@ -15,13 +15,15 @@ from passpmp_ti import FutureModel
 from passpmp_ti.bench.found import Found, Options
 from passpmp_ti.bench.scenes import car_scene
 from passpmp_ti.planner.swarm import Swarm
-from passpmp_ti.planner.tree import TreeGrower
+from passpmp_ti.planner.tree import planted
 
 SIZES = (1_000, 10_000, 100_000, 1_000_000)
 QUICK_SIZES = SIZES[:3]
 MIB = 2**20
 POSE = 28
 """Bytes of a node's pose, the least that a node can be: the yardstick of the ratios."""
+NODE = ((7, np.float32), (8, np.int32), (5, np.float32))
+"""A node's pose, link and cost."""
 TOLD_FROM = 16 * MIB
 """Smaller owners drown in what an allocator keeps: no ratio is told of them."""
 
@@ -43,8 +45,8 @@ def measure(options: Options) -> Found:
     for size in options.sizes or (QUICK_SIZES if options.quick else SIZES):
         settings = scene.settings.changed(capacity=size)
         for owner, make in (
-            ("tree", lambda s=settings: TreeGrower(scene.robot, s)),
-            ("swarm", lambda s=settings: Swarm(s)),
+            ("tree", lambda n=size: planted(n, *(np.zeros(k, t) for k, t in NODE))),
+            ("swarm", lambda s=settings: Swarm(scene.robot, s)),
         ):
             options.see(f"memory: {owner} of {size:,} nodes")
             _give_back()

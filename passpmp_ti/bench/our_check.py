@@ -8,6 +8,7 @@ import numpy as np
 
 from passpmp_ti import device
 from passpmp_ti.grid.body import Body
+from passpmp_ti.grid.spans import spans_of
 from passpmp_ti.kernels.check import check_states
 from passpmp_ti.robots import Robot
 from passpmp_ti.settings import Settings
@@ -36,12 +37,12 @@ def our_check(
         safe.
     """
     body = Body.of(robot, settings)
+    size = len(arrival_ticks)
+    arrival, counts = device.put(arrival_ticks), device.put(body.placed(corner, size))
     arguments = [
-        device.put(array)
-        for array in (
-            arrival_ticks, body.numbers, body.placed(corner, len(arrival_ticks)), body.braking,
-            np.ascontiguousarray(poses), ticks, np.zeros(len(poses), dtype=np.int32),
-        )
+        arrival, spans_of(arrival, counts, size), device.put(body.numbers), counts,
+        device.put(body.braking), device.put(np.ascontiguousarray(poses)), device.put(ticks),
+        device.empty((len(poses),), np.int32),
     ]  # fmt: skip
 
     def call() -> None:

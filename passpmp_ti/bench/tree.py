@@ -14,11 +14,11 @@ from passpmp_ti.bench import reference, rivals
 from passpmp_ti.bench.found import Found, Options
 from passpmp_ti.bench.limit import Limit
 from passpmp_ti.bench.machine import has_avx512
-from passpmp_ti.bench.memory import available, held
+from passpmp_ti.bench.memory import available
 from passpmp_ti.bench.rounds import interleaved
 from passpmp_ti.bench.scenes import Scene, car_scene
 from passpmp_ti.planner.guide import Guide
-from passpmp_ti.planner.tree import TreeGrower
+from passpmp_ti.planner.tree import TreeGrower, tree_bytes
 
 SIZES = (100, 1_000, 10_000, 100_000, 1_000_000, 10_000_000)
 QUICK_SIZES = SIZES[:4]
@@ -72,7 +72,7 @@ def measure(options: Options) -> Found:
     )
     for size in options.sizes or (QUICK_SIZES if options.quick else SIZES):
         room = available()
-        if room and _needed(scene, size) > MOST_OF_MEMORY * room:
+        if room and _needed(size) > MOST_OF_MEMORY * room:
             found.notes.append(f"{size:,} nodes do not fit into {room / 2**30:.1f} GiB")
             continue
         options.see(f"tree: {size:,} nodes")
@@ -127,10 +127,9 @@ def _measure_one(
                 found.ratios[f"{size:.0e}: {ours} / {name}"] = rounds.faster(ours, name) * share
 
 
-def _needed(scene: Scene, size: int) -> float:
+def _needed(size: int) -> float:
     """Bytes that all rivals' trees of `size` nodes take, about."""
-    small = TreeGrower(scene.robot, scene.settings.changed(capacity=1000))
-    return 3 * held(small) / 1000 * size
+    return 4 * tree_bytes(size)
 
 
 def _ours(scene: Scene, size: int, step: float) -> Callable[[], Grown]:

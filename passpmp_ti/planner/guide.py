@@ -192,7 +192,7 @@ def mean_cost(times: np.ndarray, costs: np.ndarray, horizon: float) -> float:
         times: [n] from the start of the plan [s].
         costs: [n] cost to go then.
     """
-    spent = float(np.sum(np.diff(times) * costs[1:])) if len(times) > 1 else 0.0
+    spent = float(np.sum(0.5 * np.diff(times) * (costs[1:] + costs[:-1])))
     taken = float(times[-1] - times[0])
     span = max(horizon, taken)
     rest = span - taken

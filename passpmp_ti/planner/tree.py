@@ -39,6 +39,8 @@ GRAIN, BLOCKS = 16, 16
 slots side by side."""
 DEVICE_CHUNK, DEVICE_BLOCKS = 1 << 20, 1024
 """The same on a device, where each thread checks one child."""
+FILLED = 0.5
+"""Share of the memory that a tree may fill: the rest is for the model, the swarm and others."""
 DEEPEST = 64
 """Levels that a plan is read back from."""
 
@@ -194,12 +196,28 @@ def follow(model: FutureModel, pose: np.ndarray, parts: list[tuple[np.ndarray, i
     return path[: length[0]]
 
 
+def tree_bytes(capacity: int) -> int:
+    """What a tree of `capacity` nodes takes [bytes]."""
+    return capacity * 4 * (7 + 8 + 5)
+
+
 class TreeGrower:
-    """Grows trees; owns what is kept of children between their check and their place in a tree."""
+    """Grows trees; owns what is kept of children between their check and their place in a tree.
+
+    Raises:
+        ValueError: a tree of `Settings.capacity` does not fit the memory where it would be grown.
+    """
 
     def __init__(self, robot: Robot, settings: Settings) -> None:
         self._settings = settings
         fan = len(robot.controls)
+        room, wanted = device.memory(), tree_bytes(settings.capacity)
+        if wanted > FILLED * room:
+            raise ValueError(
+                f"Settings.capacity = {settings.capacity} nodes take {wanted / 2**30:.1f} GiB, and"
+                f" {FILLED:.0%} of the {room / 2**30:.1f} GiB of memory may be filled; at most"
+                f" {int(FILLED * room / tree_bytes(1))} nodes fit"
+            )
         # never less than one parent's, nor more than the largest level could need
         resident = device.resident()
         self._chunk = max(1, min(settings.capacity, (DEVICE_CHUNK if resident else CHUNK) // fan))
@@ -232,7 +250,7 @@ class TreeGrower:
             until = budget if until is None else min(until, budget)
         here = guide.at(root[None])[0]
         root_pose = to_poses(root[None], model.window.anchor)[0]
-        arrays = _rooted(
+        arrays = planted(
             settings.capacity,
             root_pose,
             np.array([NO_PARENT, 0, 0, model.ticks_of(start), proof, -1, 0, 0], dtype=np.int32),
@@ -284,7 +302,7 @@ def _in_time(parents: int, left: float, pace: float) -> int:
     return parents if pace == 0.0 else min(parents, int(left / (1.5 * pace)))
 
 
-def _rooted(
+def planted(
     capacity: int, pose: np.ndarray, link: np.ndarray, cost: np.ndarray
 ) -> tuple[device.Array, device.Array, device.Array]:
     """Arrays of `capacity` nodes whose first is the root. Memory that no node comes to use costs
