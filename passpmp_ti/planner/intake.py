@@ -73,6 +73,27 @@ def scans_in(given: object) -> tuple[tuple[Scan, ...], str]:
     return scans, ""
 
 
+def standing(scan: object, state: object, robot: Robot) -> Trajectory:
+    """Standing where the first cycle finds the robot, from its scan's stamp on.
+
+    Raises:
+        ValueError: no scan, or a robot that is not at rest.
+    """
+    scans, trouble = scans_in(scan)
+    if trouble and not (scans and math.isfinite(scans[0].stamp)):
+        raise ValueError(
+            f"Navigator.update: {trouble}; the first cycle needs a scan, without one there is"
+            f" no time to start from; the robot is at {state!r}"
+        )
+    given = robot.check_states("Navigator.update", np.asarray(state)[None])[0]
+    if not robot.at_rest(given):
+        raise ValueError(
+            "Navigator.update: the first cycle needs a robot at rest, nothing is planned yet"
+            f" that could stop it; got {given!r}"
+        )
+    return Trajectory.resting(given, scans[0].stamp)
+
+
 def state_in(given: object) -> np.ndarray | None:
     """The state [5], or None where it is none."""
     try:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -12,10 +11,11 @@ import numpy as np
 from passpmp_ti import backend, door
 from passpmp_ti.grid.model import FutureModel
 from passpmp_ti.grid.static_map import StaticMap
+from passpmp_ti.planner.budget import Budget, Reserve, without_collector
 from passpmp_ti.planner.coast import decision_time
 from passpmp_ti.planner.followed import trouble_with
 from passpmp_ti.planner.guide import Guide, GuideField
-from passpmp_ti.planner.intake import Heard, Intake, scans_in
+from passpmp_ti.planner.intake import Heard, Intake, standing
 from passpmp_ti.planner.objective import trajectory_cost
 from passpmp_ti.planner.place import allowed_gap, carried_on, gap, stitched
 from passpmp_ti.planner.plan import (
@@ -25,6 +25,7 @@ from passpmp_ti.planner.plan import (
     trajectory_to,
 )
 from passpmp_ti.planner.record import CycleRecord
+from passpmp_ti.planner.rehearsal import rehearse
 from passpmp_ti.planner.swarm import Swarm, best_leaf
 from passpmp_ti.planner.tree import ROOT, Tree, TreeGrower
 from passpmp_ti.planner.vanished import BELIEVED_AT_LAST, Belief
@@ -87,6 +88,9 @@ class Navigator:
         self._swarm = Swarm(robot, settings) if settings.optimizer == "pso" else None
         self._guide: Guide | None = None
         self._next_goal = 0
+        self._reserve = Reserve()
+        if settings.deadline is not None:
+            rehearse(Navigator, robot, settings)
 
     @property
     def goal(self) -> tuple[float, float]:
@@ -124,37 +128,25 @@ class Navigator:
                 what cannot be used is an unseen world, a planner that raises has found no plan
                 (`record.fault`), and the robot goes on to rest on what it holds.
         """
-        began = time.perf_counter()
-        if self.held is None:
-            self.held = self._road = self._start(scan, state)
-        try:
-            record = self._cycle(scan, state, following, began)
-        except Exception as error:  # whatever it is: what is held ends at rest without a planner
-            self._guide = None
-            record = self._holding(math.nan, _told(error), fault=_told(error))
-        timings = {**record.timings, "total": time.perf_counter() - began}
-        self.record = replace(record, timings=timings)
+        deadline = self.settings.deadline
+        with without_collector(deadline is not None):
+            budget = Budget(deadline, self._reserve)
+            if self.held is None:
+                self.held = self._road = standing(scan, state, self.robot)
+                self._started = self.held.start
+            try:
+                record = self._cycle(scan, state, following, budget)
+            except Exception as error:  # whatever it is: what is held ends at rest by itself
+                self._guide = None
+                record = self._holding(math.nan, _told(error), fault=_told(error))
+            # the last cycle's tree goes, and that takes time too
+            self.record = record
+            budget.close()
+            self.record = replace(record, timings=budget.timings, time_left=budget.left())
         return self.held
 
-    def _start(self, scan: object, state: object) -> Trajectory:
-        """Standing where the first cycle finds the robot."""
-        scans, trouble = scans_in(scan)
-        if trouble and not (scans and math.isfinite(scans[0].stamp)):
-            raise ValueError(
-                f"Navigator.update: {trouble}; the first cycle needs a scan, without one there is"
-                f" no time to start from; the robot is at {state!r}"
-            )
-        given = self.robot.check_states("Navigator.update", np.asarray(state)[None])[0]
-        if not self.robot.at_rest(given):
-            raise ValueError(
-                "Navigator.update: the first cycle needs a robot at rest, nothing is planned yet"
-                f" that could stop it; got {given!r}"
-            )
-        self._started = scans[0].stamp
-        return Trajectory.resting(given, self._started)
-
     def _cycle(
-        self, scan: object, state: object, following: Trajectory | None, began: float
+        self, scan: object, state: object, following: Trajectory | None, budget: Budget
     ) -> CycleRecord:
         """Hear, model, judge, plan. What is kept is replaced whole, or not at all."""
         assert self.held is not None
@@ -182,13 +174,14 @@ class Navigator:
             # where memory was, or when, is not known any more
             self.model = self._guide = None
         model = self._model(heard, lost)
-        modelled = time.perf_counter()
+        budget.lap("model")
         if witness is not None and not len(model.broken_premises):
             rests = bool(heard.anew) or stamp >= self.held.end
             doubt = self._belief.doubt(witness, model, timeless=bool(forgot), rests=rests)
             if doubt == BELIEVED_AT_LAST:
                 self.model = self._guide = None
                 model, forgot = self._model(heard, lost), doubt
+                budget.lap("model")
             elif doubt:
                 self.model = witness
                 return self._holding(stamp, doubt, unheard=True, not_taken=not_taken)
@@ -214,16 +207,17 @@ class Navigator:
         self.model, self._modelled = model, True
         self._heard_at = stamp
         self._intake.used(heard)
+        budget.lap("bookkeeping")
         if not alarm:
             try:
-                record = self._plan(record, model, heard.state, root, proof, start, began)
+                record = self._plan(record, model, heard.state, root, proof, start, budget)
             except Exception as error:  # as above; the model is whole, and memory keeps it
                 self._guide = None
                 record = replace(
                     record, reason=_told(error), fault=_told(error), chosen=self.held,
                     plan_time=max(self.held.end - start, 0.0),
                 )  # fmt: skip
-        return replace(record, timings={"model": modelled - began, **record.timings})
+        return record
 
     def _model(self, heard: Heard, lost: bool) -> FutureModel:
         """W(t_k). A disc is declared clear about the start, and then, only; a map's coordinates
@@ -275,49 +269,57 @@ class Navigator:
         root: np.ndarray,
         proof: int,
         start: float,
-        began: float,
+        budget: Budget,
     ) -> CycleRecord:
-        """Choose what to hold from t_{k+1} on; `began`: wall clock at the cycle's start."""
+        """Choose what to hold from t_{k+1} on."""
         assert self.held is not None
         settings = self.settings
-        timings: dict[str, float] = {}
-        clock = _Clock(timings)
         if self._arrive(state, root, start):
-            clock.lap("bookkeeping")
-            return replace(record, decision="arrived", chosen=self.held, timings=timings)
+            return replace(record, decision="arrived", chosen=self.held)
 
+        if budget.explored():
+            return self._without_tree(record, "the model left no time to plan before the deadline")
         guide = self._guide_field(model, state)
-        clock.lap("guide")
-        tree = self._grower.grow(model, guide, root, start, proof)
-        clock.lap("tree")
+        budget.lap("guide")
+        if budget.explored():
+            return self._without_tree(record, "the guide left no time to plan before the deadline")
+        tree = self._grower.grow(model, guide, root, start, proof, until=budget.until)
+        budget.lap("tree")
+        budget.grown()
         leaf, particles, cost_new = self._choose(tree)
         cost_held = trajectory_cost(self.held, start, guide, settings, self.robot)
-        clock.lap("choice")
+        budget.lap("choice")
         plan, reason = None, "no safe plan was found"
         if leaf != ROOT:
             reason = "the held plan is at least as good"
             if cost_new < cost_held - max(TIE, TIE_SHARE * cost_held):
                 plan = trajectory_to(tree, leaf)
-                late = settings.deadline is not None and (
-                    time.perf_counter() - began > settings.deadline
-                )
-                if late:
-                    plan, reason = None, "planning took longer than the deadline"
-                elif not still_clear(model, plan):
+                if not still_clear(model, plan):
                     plan, reason = None, "the new plan did not stand its second check"
         chosen = self.held if plan is None else plan
         delay = decision_time(model, chosen, record.stamp, start)
-        clock.lap("bookkeeping")
+        if plan is not None and budget.late():
+            plan, reason, chosen = None, "planning took longer than the deadline", self.held
+            delay = decision_time(model, chosen, record.stamp, start)
         if plan is not None:
             self._hold(plan)
+        budget.lap("bookkeeping")
         return replace(
             record, decision="held" if plan is None else "new",
-            reason=reason if plan is None else "", timings=timings, tree=tree,
+            reason=reason if plan is None else "", tree=tree,
             tree_nodes=tree.count, tree_depth=tree.depth, tree_stopped_by=tree.stopped_by,
             cost=cost_held if plan is None else cost_new, cost_new=cost_new, cost_held=cost_held,
             plan_time=max(chosen.end - start, 0.0), decision_time=delay,
             particle_leaves=particles, chosen=chosen,
         )  # fmt: skip
+
+    def _without_tree(self, record: CycleRecord, reason: str) -> CycleRecord:
+        """What is held is kept, since there was no time to look for anything better."""
+        assert self.held is not None
+        start = record.stamp + self.settings.cycle
+        return replace(
+            record, reason=reason, chosen=self.held, plan_time=max(self.held.end - start, 0.0)
+        )
 
     def _arrive(self, state: np.ndarray, root: np.ndarray, start: float) -> bool:
         """At rest at a goal: go on to the next one, or stay for good at the last."""
@@ -379,16 +381,3 @@ class Navigator:
 def _told(error: Exception) -> str:
     """An error in one line."""
     return f"{type(error).__name__}: {error}".splitlines()[0][:300]
-
-
-class _Clock:
-    """Writes the seconds since the lap before into a dict."""
-
-    def __init__(self, timings: dict[str, float]) -> None:
-        self._timings = timings
-        self._last = time.perf_counter()
-
-    def lap(self, name: str) -> None:
-        now = time.perf_counter()
-        self._timings[name] = now - self._last
-        self._last = now

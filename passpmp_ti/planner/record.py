@@ -26,6 +26,9 @@ class CycleRecord:
     """Why the plan is not a new one; empty where it is."""
     timings: dict[str, float] = field(default_factory=dict)
     """Seconds spent: "model", "guide", "tree", "choice", "bookkeeping", "total"."""
+    time_left: float = float("inf")
+    """Wall clock time between the answer and `Settings.deadline` [s]; negative: it came late; inf:
+    there is no deadline."""
     tree_nodes: int = 0
     tree_depth: int = 0
     tree_stopped_by: str = ""
