@@ -5,14 +5,13 @@ from __future__ import annotations
 import contextlib
 import io
 import logging
-import os
-from pathlib import Path
 
-from passpmp_ti import door
+from passpmp_ti import door, kernel_cache, probe
 
 BACKENDS = ("auto", "cpu", "cuda", "vulkan", "metal")
 
 _running: str | None = None
+_log = logging.getLogger("passpmp_ti")
 
 
 def init(backend: str = "auto", threads: int | None = None, *, debug: bool = False) -> str:
@@ -44,16 +43,22 @@ def init(backend: str = "auto", threads: int | None = None, *, debug: bool = Fal
 
     import taichi as ti
 
-    # taichi.gpu crashes on machines without one: name a backend, and CUDA only beside its driver.
-    wanted = backend if backend != "auto" else ("cuda" if _cuda_driver_present() else "cpu")
+    wanted = backend if backend != "auto" else _chosen()
+    if backend not in ("auto", "cpu"):
+        # asked in another process: what does not work may end the one that tries it
+        reason = probe.trouble(backend, again=True)
+        if reason:
+            raise _refusal(backend, reason)
+    kept = kernel_cache.prepared()
     options: dict[str, object] = dict(
         log_level=ti.ERROR,
-        offline_cache=True,
-        offline_cache_file_path=str(cache_folder()),
+        offline_cache=kept is not None,
         fast_math=False,
         debug=debug,
         random_seed=0,
     )
+    if kept is not None:
+        options["offline_cache_file_path"] = str(kept)
     if threads is not None:
         options["cpu_max_num_threads"] = threads
         # OpenCV's own threads would wait busily on cores that others were promised
@@ -62,32 +67,70 @@ def init(backend: str = "auto", threads: int | None = None, *, debug: bool = Fal
 
             cv2.setNumThreads(threads)
     try:
-        with contextlib.redirect_stdout(io.StringIO()):
-            ti.init(arch=getattr(ti, wanted), enable_fallback=False, **options)
+        _start(wanted, options)
     except RuntimeError as cause:
-        if backend != "auto":
-            raise RuntimeError(
-                f"init.backend = {backend!r} does not work on this machine ({cause});"
-                " use 'auto' or 'cpu'"
-            ) from cause
+        if backend != "auto" or wanted == "cpu":
+            raise _refusal(backend, str(cause)) from cause
+        _log.warning("%s worked in a trial and does not now (%s)", wanted, cause)
         wanted = "cpu"
-        with contextlib.redirect_stdout(io.StringIO()):
-            ti.init(arch=ti.cpu, **options)
+        _start(wanted, options)
+    if not debug:
+        _shorten_first_compilation()
     _running = wanted
-    logging.getLogger("passpmp_ti").info("kernels run on %s", wanted)
+    _log.info("kernels run on %s", wanted)
     return wanted
+
+
+def _chosen() -> str:
+    """CUDA where it works, else the CPU; `taichi.gpu` would crash where there is no GPU."""
+    if not probe.has_driver("cuda"):
+        return "cpu"
+    reason = probe.trouble("cuda")
+    if not reason:
+        return "cuda"
+    _log.warning("there is a driver for CUDA, but it does not work here: %s", reason)
+    return "cpu"
+
+
+def _refusal(backend: str, reason: str) -> RuntimeError:
+    return RuntimeError(
+        f"init.backend = {backend!r} does not work on this machine ({reason}); use 'auto' or"
+        f" 'cpu', or see whether `{' '.join(probe.command(backend))}` works after a change of the"
+        " driver"
+    )
+
+
+def _start(arch: str, options: dict[str, object]) -> None:
+    import taichi as ti
+
+    # Taichi greets on standard output, which belongs to the program
+    with contextlib.redirect_stdout(io.StringIO()):
+        ti.init(arch=getattr(ti, arch), enable_fallback=False, **options)
+
+
+def _shorten_first_compilation() -> None:
+    """Let Taichi not wrap the source lines that it keeps for its error messages.
+
+    It prepares a message for every expression that it reads, and wrapping them takes a third of
+    the time in which a kernel is made ready, out of the cache too. The lines stay, in full length.
+    """
+    from taichi.lang.ast import ast_transformer_utils
+
+    if hasattr(ast_transformer_utils, "TextWrapper"):
+        ast_transformer_utils.TextWrapper = _Unwrapped
+
+
+class _Unwrapped:
+    """Takes the place of `textwrap.TextWrapper`: a text is one line."""
+
+    def __init__(self, width: int) -> None:
+        """As `TextWrapper`; the width bounds nothing."""
+
+    def wrap(self, text: str) -> list[str]:
+        """[the text]; [] where there is none."""
+        return [text] if text.strip() else []
 
 
 def running() -> str | None:
     """The backend that runs, or None before `init`."""
     return _running
-
-
-def cache_folder() -> Path:
-    """Where compiled kernels are kept between processes."""
-    base = os.environ.get("XDG_CACHE_HOME") or str(Path.home() / ".cache")
-    return Path(base) / "passpmp_ti" / "kernels"
-
-
-def _cuda_driver_present() -> bool:
-    return Path("/proc/driver/nvidia/version").exists() or Path("/dev/nvidiactl").exists()

@@ -6,7 +6,7 @@ import argparse
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from passpmp_ti import door
 
@@ -16,20 +16,22 @@ if TYPE_CHECKING:
 EXAMPLE = """passpmp bench check tree --quick
   passpmp bench --limit path/to/cpp --json all.json
   passpmp bench cycle --cycles 200 --json cycle.json"""
-NAMES = ("raster", "check", "tree", "swarm", "cycle", "memory")
+NAMES = ("raster", "check", "tree", "swarm", "cycle", "anytime", "startup", "memory")
+DRIVING = ("cycle", "anytime")
+"""Those that can drive a scenario that is named after them."""
 STRICT = 1
 """Exit code where a ratio fell and --strict was given."""
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """What `bench` takes beside the scenario options, which `cycle` alone reads."""
+    """What `bench` takes beside the scenario options, which only those that drive read."""
     add = parser.add_argument
     add(
         "names",
         nargs="*",
         metavar="name",
         help=f"{', '.join(NAMES)}; all if none is named. After `cycle` also a scenario that it"
-        " drives instead of its own scenes",
+        " or `anytime` drives instead of its own",
     )
     add("--backend", default="auto", metavar="B", help="auto, cpu, cuda, vulkan or metal")
     add("--threads", type=int, metavar="N", help="of the kernels and their rivals (default: all)")
@@ -37,7 +39,8 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     add("--limit", metavar="DIR", help="a folder with the tuned C++ (perf.cpp) to compare with")
     add("--quick", action="store_true", help="smaller sizes, fewer rounds")
     add("--sizes", metavar="A,B", help="states, nodes or capacities instead of the usual ones")
-    add("--cycles", type=int, default=1000, metavar="N", help="of `cycle` (default: 1000)")
+    add("--cycles", type=int, metavar="N", help="of `cycle` (1000) and `anytime` (10000)")
+    add("--deadline", type=float, metavar="S", help="of a cycle of `anytime` [s] (default: 0.05)")
     add("--results", metavar="DIR", help="committed results (default: benchmarks/results)")
     add(
         "--commit-result",
@@ -64,12 +67,18 @@ def run(given: argparse.Namespace, scenario_of: Callable[[str], Scenario]) -> in
         threads=given.threads,
         limit=Path(given.limit) if given.limit else None,
         sizes=sizes,
-        cycles=door.whole("bench", "cycles", given.cycles, least=1),
+        cycles=_asked(given.cycles, lambda n: door.whole("bench", "cycles", n, least=1)),
+        deadline=_asked(
+            given.deadline, lambda s: door.finite("bench", "deadline", s, above=0.0, unit="s")
+        ),
         seed=given.seed,
         scenario=scenario_of(scenario) if scenario else None,
         see=_see,
     )
-    running = backend.init(given.backend, given.threads)
+    try:
+        running = backend.init(given.backend, given.threads)
+    except RuntimeError as error:  # no trace where only the machine lacks what was asked for
+        raise ValueError(str(error)) from error
     folder = Path(given.results) if given.results else baseline.RESULTS
     results, fallen = [], False
     for result in suite.carry_out(names, options):
@@ -90,16 +99,21 @@ def run(given: argparse.Namespace, scenario_of: Callable[[str], Scenario]) -> in
 
 
 def split(given: Sequence[str]) -> tuple[tuple[str, ...], str | None]:
-    """(benchmarks, scenario of `cycle`) out of the names on the command line.
+    """(benchmarks, scenario to drive) out of the names on the command line.
 
     Raises:
         ValueError: a name that is no benchmark, where no scenario can stand.
     """
     names = tuple(dict.fromkeys(name for name in given if name in NAMES))
     others = [name for name in given if name not in NAMES]
-    if len(others) > 1 or (others and names != ("cycle",)):
+    if len(others) > 1 or (others and (len(names) != 1 or names[0] not in DRIVING)):
         door.choice("bench", "name", others[0], NAMES)
     return names or NAMES, others[0] if others else None
+
+
+def _asked(given: Any, check: Callable[[Any], Any]) -> Any:
+    """What was given, checked; None where nothing was."""
+    return None if given is None else check(given)
 
 
 def _size(text: str) -> int:

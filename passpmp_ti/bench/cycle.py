@@ -25,7 +25,7 @@ WARM_UP = 5
 """Cycles left out as the first episode begins: they load or compile the kernels."""
 
 
-QUICK_CYCLES = 100
+CYCLES, QUICK_CYCLES = 1000, 100
 LONG = (0.4,) * 7
 """Primitives that make a tree of ten thousand nodes [s]."""
 YARDSTICK_EVERY = 25
@@ -61,7 +61,9 @@ def measure(options: Options) -> Found:
     from passpmp_ti.viz.report import cycle_report
 
     scenes = [options.scenario] if options.scenario else default_scenes()
-    cycles = min(options.cycles, QUICK_CYCLES) if options.quick else options.cycles
+    cycles = options.cycles or CYCLES
+    if options.quick:
+        cycles = min(cycles, QUICK_CYCLES)
     found = Found(
         title="scan to trajectory, in ms",
         rows=[],
@@ -102,7 +104,7 @@ def default_scenes() -> list[Scenario]:
     ]
 
 
-def measure_cycle(scenario: Scenario, cycles: int = 1000, seed: int = 0) -> dict[str, Any]:
+def measure_cycle(scenario: Scenario, cycles: int = CYCLES, seed: int = 0) -> dict[str, Any]:
     """Drive through a scenario and take the time of every cycle.
 
     Args:

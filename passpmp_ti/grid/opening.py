@@ -14,7 +14,6 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from scipy import ndimage
 
 from passpmp_ti.grid.distance import distance_between_cells, distance_to_zeros
 from passpmp_ti.kernels.beams import SLACK
@@ -37,6 +36,8 @@ def opened_sources(seen: np.ndarray, marks: np.ndarray, cell: float, radius: flo
         entered it, which a wall may hide from where it comes out: neither set of sources is nearer
         than the other everywhere, and what arrives must have come by both.
     """
+    from scipy import ndimage  # only here: it takes long to import, and few ask for openings
+
     marks = marks.copy()
     opened = opened_region(seen, cell, radius)
     sliver, count = ndimage.label((seen == 0) & ~opened, ALL_ROUND)

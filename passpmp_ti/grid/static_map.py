@@ -8,7 +8,6 @@ from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
-from scipy.ndimage import distance_transform_edt
 
 from passpmp_ti import door
 from passpmp_ti.grid.map_file import read_map
@@ -133,6 +132,9 @@ class StaticMap:
         tolerance = door.finite("StaticMap.dilated", "tolerance", tolerance, least=0.0, unit="m")
         if tolerance not in self._dilated:
             if self.occupied.any():
+                # only here: it takes long to import, and many robots have no map
+                from scipy.ndimage import distance_transform_edt
+
                 distance = distance_transform_edt(~self.occupied, sampling=self.resolution)
                 grown = distance <= tolerance
             else:

@@ -1,0 +1,164 @@
+"""Whether cycles meet their deadline when time alone ends the exploration."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from passpmp_ti.bench.found import Found, Options
+from passpmp_ti.planner.navigator import Navigator
+from passpmp_ti.sim.episode import simulate
+from passpmp_ti.sim.scenario import Scenario, load_scenario
+from passpmp_ti.trajectory import Trajectory
+
+CYCLES, QUICK_CYCLES = 10_000, 200
+DEADLINE = 0.05
+"""[s]"""
+CAPACITY = 200_000
+"""Nodes: more than any cycle has the time for."""
+TASKS = Path("/proc/self/task")
+
+
+class _EnoughError(Exception):
+    """Ends an episode from within."""
+
+
+@dataclass
+class _Watch:
+    """What was seen of every cycle; arrays by `taken`."""
+
+    wanted: int
+    see: Callable[[str], None]
+    seconds: list[float] = field(default_factory=list)
+    cpu: list[float] = field(default_factory=list)
+    waited: list[float] = field(default_factory=list)
+    nodes: list[int] = field(default_factory=list)
+    left: list[float] = field(default_factory=list)
+    stopped_by: list[str] = field(default_factory=list)
+
+    def navigator(self, *given: Any, **named: Any) -> Navigator:
+        """A navigator whose every `update` is timed from outside."""
+        watch = self
+
+        class Timed(Navigator):
+            def update(self, *scan: Any, **following: Any) -> Trajectory:
+                waited, cpu, began = _waited(), time.process_time(), time.perf_counter()
+                answer = super().update(*scan, **following)
+                seconds = time.perf_counter() - began
+                watch.note(seconds, time.process_time() - cpu, _waited() - waited, self)
+                return answer
+
+        return Timed(*given, **named)
+
+    def note(self, seconds: float, cpu: float, waited: float, navigator: Navigator) -> None:
+        record = navigator.record
+        self.seconds.append(seconds)
+        self.cpu.append(cpu)
+        self.waited.append(waited)
+        self.nodes.append(record.tree_nodes)
+        self.left.append(record.time_left)
+        self.stopped_by.append(record.tree_stopped_by or record.decision)
+        if len(self.seconds) % 500 == 0:
+            self.see(f"anytime: {len(self.seconds)} of {self.wanted} cycles")
+        if len(self.seconds) >= self.wanted:
+            raise _EnoughError
+
+
+def measure(options: Options) -> Found:
+    """Drive through `crowded`, cycles as long as their deadline, and count the late answers."""
+    deadline = DEADLINE if options.deadline is None else options.deadline
+    cycles = options.cycles or CYCLES
+    if options.quick:
+        cycles = min(cycles, QUICK_CYCLES)
+    watch = drive(hurried(options.scenario or load_scenario("crowded"), deadline), cycles, options)
+    seconds, cpu, waited = (np.array(a) for a in (watch.seconds, watch.cpu, watch.waited))
+    late = seconds > deadline
+    by_itself = late & (seconds - waited > deadline)
+    spread = {
+        "median": float(np.median(seconds)),
+        "p99": float(np.quantile(seconds, 0.99)),
+        "worst": float(seconds.max()),
+    }
+    ends = {end: watch.stopped_by.count(end) for end in sorted(set(watch.stopped_by))}
+    row: dict[str, Any] = {
+        "deadline [ms]": 1e3 * deadline,
+        "cycles": len(seconds),
+        "late": int(late.sum()),
+        "late by itself": int(by_itself.sum()),
+        **{f"{name} [ms]": 1e3 * value for name, value in spread.items()},
+        "CPU, median [ms]": 1e3 * float(np.median(cpu)),
+        "nodes, median": int(np.median(watch.nodes)),
+        "nodes, most": int(max(watch.nodes)),
+    }
+    return Found(
+        title="answers within a deadline, measured outside `Navigator.update`, in ms",
+        rows=[row],
+        ratios={f"deadline / {name}": deadline / spread[name] for name in ("p99", "worst")},
+        notes=[
+            "late by itself: late even without the time in which its threads stood ready and the"
+            " machine ran something else",
+            "exploration ended by: " + ", ".join(f"{end} {n}" for end, n in ends.items()),
+        ],
+        details={
+            "worst overrun [s]": float(max(seconds.max() - deadline, 0.0)),
+            "late cycles": [
+                {
+                    "cycle": int(k),
+                    "seconds": float(seconds[k]),
+                    "cpu": float(cpu[k]),
+                    "waited": float(waited[k]),
+                    "nodes": watch.nodes[k],
+                }
+                for k in np.flatnonzero(late)
+            ],
+            "ended by": ends,
+            "time left, median [s]": float(np.median(watch.left)),
+        },
+    )
+
+
+def hurried(scenario: Scenario, deadline: float) -> Scenario:
+    """The scenario in cycles as long as the deadline [s], and a tree that only time can end."""
+    step = scenario.settings.time_step
+    return replace(
+        scenario.changed(
+            {
+                "deadline": deadline,
+                "cycle": deadline,
+                # a cycle is a whole number of steps
+                "time_step": deadline / max(round(deadline / step), 1),
+                "capacity": CAPACITY,
+            }
+        ),
+        name=f"{scenario.name}, {1e3 * deadline:g} ms",
+    )
+
+
+def drive(scenario: Scenario, cycles: int, options: Options) -> _Watch:
+    """Episodes, seed after seed, until there were enough cycles."""
+    watch = _Watch(cycles, options.see)
+    seed = options.seed
+    while len(watch.seconds) < cycles:
+        try:
+            simulate(scenario, seed=seed, planner=watch.navigator)
+        except _EnoughError:
+            break
+        seed += 1
+    return watch
+
+
+def _waited() -> float:
+    """How long the threads of this process stood ready without a core [s]; 0 where the system does
+    not tell."""
+    total = 0
+    try:
+        for task in TASKS.iterdir():
+            total += int((task / "schedstat").read_text().split()[1])
+    except (OSError, IndexError, ValueError):
+        return 0.0
+    return 1e-9 * total
