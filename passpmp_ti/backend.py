@@ -53,12 +53,11 @@ def init(backend: str = "auto", threads: int | None = None, *, debug: bool = Fal
     options: dict[str, object] = dict(
         log_level=ti.ERROR,
         offline_cache=kept is not None,
+        offline_cache_file_path=str(kept or kernel_cache.NOWHERE),
         fast_math=False,
         debug=debug,
         random_seed=0,
     )
-    if kept is not None:
-        options["offline_cache_file_path"] = str(kept)
     if threads is not None:
         options["cpu_max_num_threads"] = threads
         # OpenCV's own threads would wait busily on cores that others were promised

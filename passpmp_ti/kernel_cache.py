@@ -19,6 +19,10 @@ LOCK = "ticache.lock"
 STALE = 60.0
 """[s] A lock is held for milliseconds: one that is older was left by a process that was killed."""
 
+NOWHERE = Path(__file__).parent
+"""Taichi's folder where nothing is kept. It makes its folder as the process ends even then, and
+crashes where it cannot: so one that is there. Nothing is written to it."""
+
 
 def folder() -> Path:
     """Where compiled kernels are kept."""

@@ -6,6 +6,7 @@ ever. `python -m passpmp_ti.probe cuda` is the process that may be lost.
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import platform
@@ -132,7 +133,8 @@ def _keep(backend: str, verdict: dict[str, Any]) -> None:
         own.write_text(json.dumps({**_known(), backend: verdict}, indent=2))
         own.replace(notes)
     except OSError:
-        own.unlink(missing_ok=True)
+        with contextlib.suppress(OSError):
+            own.unlink()
 
 
 def main(backend: str) -> int:

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from passpmp_ti.bench.cycle import LONG
 from passpmp_ti.bench.found import Found, Options
 from passpmp_ti.planner.navigator import Navigator
 from passpmp_ti.sim.episode import simulate
@@ -133,6 +134,7 @@ def hurried(scenario: Scenario, deadline: float) -> Scenario:
                 # a cycle is a whole number of steps
                 "time_step": deadline / max(round(deadline / step), 1),
                 "capacity": CAPACITY,
+                "primitives": LONG,
             }
         ),
         name=f"{scenario.name}, {1e3 * deadline:g} ms",
