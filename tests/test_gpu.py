@@ -41,11 +41,25 @@ def arch(request):
     return request.param
 
 
+@pytest.fixture(scope="module")
+def every_input():
+    return {name: given(robot, make(scene)) for name, (robot, make, scene) in SCENES.items()}
+
+
 @pytest.fixture(scope="module", params=SCENES)
-def inputs(request):
-    robot, make, name = SCENES[request.param]
-    scene = make(name)
+def scene(request):
+    return request.param
+
+
+@pytest.fixture(scope="module")
+def inputs(every_input, scene):
+    return every_input[scene]
+
+
+def given(robot, scene):
+    """What a backend is asked about a scene."""
     scan = scene.scan()
+    states, times = drawn(scene)
     return {
         "robot": np.array(robot),
         # slow enough that a robot at rest has somewhere to go
@@ -56,7 +70,8 @@ def inputs(request):
         "angle_increment": np.array(scan.angle_increment),
         "range_max": np.array(scan.range_max),
         "goal": np.array([0.3 * scene.range_max, 0.1 * scene.range_max]),
-        **dict(zip(("states", "times"), drawn(scene), strict=True)),
+        "states": states,
+        "times": times,
     }
 
 
@@ -77,19 +92,28 @@ def drawn(scene):
 
 
 @pytest.fixture(scope="module")
-def found(arch, inputs, tmp_path_factory):
-    """What the backend makes of the inputs."""
+def every_answer(arch, every_input, tmp_path_factory):
+    """What the backend makes of all inputs, in one process."""
     folder = tmp_path_factory.mktemp("backend")
-    np.savez(folder / "in.npz", **inputs)
+    for name, inputs in every_input.items():
+        np.savez(folder / f"{name}.in.npz", **inputs)
     path = os.pathsep.join(p for p in (str(HOME), os.environ.get("PYTHONPATH")) if p)
     done = subprocess.run(
-        [sys.executable, on_backend.__file__, arch, folder / "in.npz", folder / "out.npz"],
+        [sys.executable, on_backend.__file__, arch, folder],
         env={**os.environ, "PYTHONPATH": path},
         capture_output=True, text=True, timeout=600, check=False,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
-    with np.load(folder / "out.npz") as saved:
-        return dict(saved)
+    answers = {}
+    for name in every_input:
+        with np.load(folder / f"{name}.out.npz") as saved:
+            answers[name] = dict(saved)
+    return answers
+
+
+@pytest.fixture(scope="module")
+def found(every_answer, scene):
+    return every_answer[scene]
 
 
 @pytest.fixture(scope="module")

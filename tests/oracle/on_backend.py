@@ -1,11 +1,12 @@
-"""What one backend makes of saved inputs: `python on_backend.py BACKEND IN.npz OUT.npz`.
+"""What one backend makes of saved inputs: `python on_backend.py BACKEND FOLDER`.
 
-A process has one backend, so each is asked in a process of its own; imported, it is the same
-computation on the backend that runs already.
+Each NAME.in.npz there is answered by a NAME.out.npz. A process has one backend, so each is asked in
+a process of its own; imported, it is the same computation on the backend that runs already.
 """
 
 import contextlib
 import sys
+from pathlib import Path
 
 import numpy as np
 
@@ -74,8 +75,10 @@ def carried_out(inputs):
 
 
 if __name__ == "__main__":
-    arch, given, answer = sys.argv[1:]
+    arch, folder = sys.argv[1], Path(sys.argv[2])
     pti.init("cpu" if arch == APART else arch)
-    apart = device.forced() if arch == APART else contextlib.nullcontext()
-    with apart, np.load(given) as saved:
-        np.savez(answer, **carried_out(dict(saved)))
+    with device.forced() if arch == APART else contextlib.nullcontext():
+        for file in sorted(folder.glob("*.in.npz")):
+            with np.load(file) as saved:
+                answer = carried_out(dict(saved))
+            np.savez(folder / file.name.replace(".in.", ".out."), **answer)
