@@ -69,8 +69,11 @@ class Settings:
     """Time budget of the tree's growth [s], t_exploration of Algorithm 2; None: no budget."""
 
     deadline: float | None = None
-    """Wall clock time within which a cycle must answer [s]: a plan that comes later is dropped, and
-    the robot goes on with what it holds. None: simulated time, no clock is looked at."""
+    """Wall clock time within which a cycle must answer [s]: exploration ends in time for what comes
+    after it, and a plan that is late all the same is dropped: the robot goes on with what it holds.
+    `Navigator` then compiles every kernel beforehand, which takes seconds, keeps Python's garbage
+    collector out of its cycles, and exempts from it what the process holds (`gc.freeze`). None:
+    simulated time; nothing is decided by a clock."""
 
     # the choice
     optimizer: str = "pso"

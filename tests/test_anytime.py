@@ -168,9 +168,9 @@ def test_after_a_slow_choice_more_is_kept_back(clock, monkeypatch):
         return really(self, *given, until=until)
 
     monkeypatch.setattr(TreeGrower, "grow", grow)
-    taking(monkeypatch, clock, Swarm, "choose", 0.022)
+    taking(monkeypatch, clock, Swarm, "choose", 0.018)
     drive(navigator, 2)
-    assert told == [pytest.approx(DEADLINE * (1 - FIRST)), pytest.approx(DEADLINE - FACTOR * 0.022)]
+    assert told == [pytest.approx(DEADLINE * (1 - FIRST)), pytest.approx(DEADLINE - FACTOR * 0.018)]
 
 
 def test_nothing_is_planned_where_the_model_took_too_long(clock, monkeypatch):

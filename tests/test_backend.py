@@ -11,6 +11,8 @@ from pathlib import Path
 import pytest
 
 from passpmp_ti import backend, kernel_cache, probe
+from passpmp_ti.bench import startup
+from passpmp_ti.bench.fresh import PARTS
 
 HOME = Path(backend.__file__).resolve().parents[1]
 
@@ -250,3 +252,27 @@ def test_importing_the_planner_does_not_import_scipy():
         "print([m for m in ('scipy',) if m in sys.modules])"
     )
     assert told.strip().endswith("[]")
+
+
+def test_what_taichi_says_of_a_mistake_still_shows_the_line():
+    import taichi as ti
+
+    @ti.kernel
+    def mistaken() -> ti.i32:
+        return no_such_name + 1000000 + 2000000 + 3000000 + 4000000 + 5000000 + 6000000  # noqa: F821
+
+    with pytest.raises(ti.TaichiNameError) as error:
+        mistaken()
+    line = next(row for row in str(error.value).splitlines() if "no_such_name + " in row)
+    assert "6000000" in line
+    assert "^^^^^^" in str(error.value)
+
+
+# the benchmark ----------------------------------------------------------------------------------
+
+
+def test_a_fresh_process_tells_what_its_start_took(tmp_path):
+    seconds = startup.fresh(str(tmp_path), "cpu")
+    assert tuple(seconds) == PARTS
+    assert all(value >= 0 for value in seconds.values())
+    assert list((tmp_path / "passpmp_ti" / "kernels").glob("*.tic"))

@@ -15,7 +15,8 @@ if TYPE_CHECKING:
 
 EXAMPLE = """passpmp bench check tree --quick
   passpmp bench --limit path/to/cpp --json all.json
-  passpmp bench cycle --cycles 200 --json cycle.json"""
+  passpmp bench cycle --cycles 200 --json cycle.json
+  passpmp bench anytime --cycles 10000 --deadline 0.05"""
 NAMES = ("raster", "check", "tree", "swarm", "cycle", "anytime", "startup", "memory")
 DRIVING = ("cycle", "anytime")
 """Those that can drive a scenario that is named after them."""

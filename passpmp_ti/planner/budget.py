@@ -11,7 +11,7 @@ FIRST = 0.25
 """Share of the deadline that is kept back before any cycle has told how much its end takes."""
 DECAY = 0.98
 """What is kept back falls by this factor a cycle, to what the ends really take."""
-FACTOR = 1.5
+FACTOR = 2.0
 """How many times the longest end of late is kept back: the next may be longer."""
 LEAST = 0.002
 """[s] kept back whatever was measured: a launch, or a page of memory, may come late by as much."""
