@@ -143,8 +143,9 @@ def main(backend: str) -> int:
     import taichi as ti
 
     ti.init(
-        arch=getattr(ti, backend), enable_fallback=False, log_level=ti.ERROR, offline_cache=False
-    )
+        arch=getattr(ti, backend), enable_fallback=False, log_level=ti.ERROR, offline_cache=False,
+        offline_cache_file_path=str(kernel_cache.NOWHERE),
+    )  # fmt: skip
     from passpmp_ti.kernels.probe import add_up
 
     whole = np.arange(NUMBERS, dtype=np.int32)

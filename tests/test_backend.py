@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from passpmp_ti import backend, kernel_cache, probe
+from passpmp_ti import backend, cli, kernel_cache, probe
 from passpmp_ti.bench import startup
 from passpmp_ti.bench.fresh import PARTS
 
@@ -73,7 +73,10 @@ def test_a_backend_that_does_not_work_only_ends_its_own_process(how, cache, monk
     assert told in probe.trouble("cuda")
 
 
-def test_a_real_probe_of_the_cpu_finds_that_it_works(cache):
+@pytest.mark.parametrize("folder", [None, os.devnull])
+def test_a_real_probe_of_the_cpu_finds_that_it_works(folder, cache, monkeypatch):
+    if folder is not None:
+        monkeypatch.setenv("XDG_CACHE_HOME", folder)
     assert probe._ask(probe.command("cpu")) == ""
 
 
@@ -150,6 +153,15 @@ def test_a_backend_asked_for_by_name_that_does_not_work_is_refused_with_the_way_
     with pytest.raises(RuntimeError, match=r"its driver is asleep.*use 'auto' or 'cpu'"):
         backend.init(name)
     assert backend.running() is None
+
+
+def test_a_benchmark_is_refused_on_a_backend_that_does_not_work(monkeypatch, capsys):
+    asked = []
+    monkeypatch.setattr(backend, "_running", None)
+    monkeypatch.setattr(probe, "trouble", lambda name, again: asked.append(name) or "it is asleep")
+    assert cli.main(["bench", "check", "--quick", "--backend", "cuda"]) == cli.BAD_INPUT
+    assert asked == ["cuda"]
+    assert "it is asleep" in capsys.readouterr().err
 
 
 def test_a_fresh_process_says_what_it_picked(tmp_path):
