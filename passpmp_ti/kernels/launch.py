@@ -1,0 +1,142 @@
+"""Kernels whose launches cost little.
+
+At each launch Taichi looks at every argument anew, in Python: with a dozen arrays that takes longer
+than many of our kernels run. A `kernel` of this module is Taichi's own, and its first call with a
+set of template arguments is Taichi's own call, which compiles and checks everything. Later calls
+hand their arguments straight to what was compiled, after the checks that Taichi makes too: type,
+dimensions, contiguity. Whatever is not as expected takes Taichi's way, and its errors are Taichi's.
+
+This leans on parts of Taichi that its public interface does not show. Where they are missing every
+call takes Taichi's way.
+"""
+
+import functools
+
+import numpy as np
+import taichi as ti
+from taichi.lang import impl
+
+MOST = 2**31 - 1
+"""Elements of an array that a kernel can address."""
+ARRAYS = {
+    id(ti.u8): np.dtype(np.uint8),
+    id(ti.u16): np.dtype(np.uint16),
+    id(ti.i32): np.dtype(np.int32),
+    id(ti.u32): np.dtype(np.uint32),
+    id(ti.f32): np.dtype(np.float32),
+}
+
+
+def kernel(function):
+    """Taichi's `ti.kernel`, with launches that cost little."""
+    slow = ti.kernel(function)
+    primal = slow._primal
+    templates, setters = _parameters(primal)
+    whole = primal.return_type is None
+    count = len(primal.arguments)
+    ready = {}
+
+    @functools.wraps(function)
+    def launch(*args):
+        if setters is None or len(args) != count:
+            return slow(*args)
+        key = tuple([args[place] for place in templates])
+        prog = impl.get_runtime().prog
+        found = ready.get(key)
+        if found is None or found[0] is not prog:
+            result = slow(*args)
+            ready[key] = _compiled(primal, args)
+            return result
+        _, made, compiled = found
+        if compiled is None:
+            return slow(*args)
+        context = made.make_launch_context()
+        for place, slot, put, wanted in setters:
+            if not put(context, slot, args[place], wanted):
+                return slow(*args)
+        prog.launch_kernel(compiled, context)
+        if whole:
+            return None
+        prog.synchronize()
+        return context.get_struct_ret_int((0,))
+
+    launch.plain = slow
+    return launch
+
+
+def _parameters(primal):
+    """(places of template arguments, how each of the others is handed over); None: Taichi's way."""
+    templates, setters = [], []
+    if primal.return_type is not None and [id(t) for t in primal.return_type] != [id(ti.i32)]:
+        return templates, None
+    for place, argument in enumerate(primal.arguments):
+        wanted = argument.annotation
+        slot = (place - len(templates),)
+        if isinstance(wanted, type(ti.template())):
+            templates.append(place)
+        elif id(wanted) == id(ti.i32):
+            setters.append((place, slot, _put_int, None))
+        elif id(wanted) == id(ti.u32):
+            setters.append((place, slot, _put_uint, None))
+        elif id(wanted) == id(ti.f32):
+            setters.append((place, slot, _put_float, None))
+        elif id(getattr(wanted, "dtype", None)) in ARRAYS:
+            setters.append((place, slot, _put_array, (ARRAYS[id(wanted.dtype)], wanted.ndim)))
+        else:
+            return templates, None
+    return templates, setters
+
+
+def _compiled(primal, args):
+    """(program, kernel, what it was compiled to); None for the last: it takes Taichi's way."""
+    prog = impl.get_runtime().prog
+    # debugging checks more than can be seen from here
+    if impl.current_cfg().debug:
+        return prog, None, None
+    try:
+        made = primal.compiled_kernels[primal.ensure_compiled(*args)]
+        return prog, made, prog.compile_kernel(prog.config(), prog.get_device_caps(), made)
+    except (AttributeError, KeyError, TypeError):
+        return prog, None, None
+
+
+def _put_int(context, slot, value, _):
+    if type(value) is not int:
+        return False
+    context.set_arg_int(slot, value)
+    return True
+
+
+def _put_uint(context, slot, value, _):
+    if type(value) is not int:
+        return False
+    context.set_arg_uint(slot, value)
+    return True
+
+
+def _put_float(context, slot, value, _):
+    if type(value) is not float:
+        return False
+    context.set_arg_float(slot, value)
+    return True
+
+
+def _put_array(context, slot, value, wanted):
+    if type(value) is np.ndarray:
+        dtype, dimensions = wanted
+        fits = value.dtype == dtype and value.ndim == dimensions and value.size <= MOST
+        if not (fits and value.flags.c_contiguous):
+            return False
+        context.set_arg_external_array_with_shape(
+            slot, value.ctypes.data, value.nbytes, value.shape, 0
+        )
+        return True
+    if isinstance(value, ti.Ndarray):
+        # its type and dimensions were compiled for, or are told apart by Taichi
+        if value.grad is not None or len(value.shape) != wanted[1]:
+            return False
+        if value.dtype is None or ARRAYS.get(id(value.dtype)) != wanted[0]:
+            return False
+        context.set_arg_ndarray(slot, value.arr)
+        return True
+    return False

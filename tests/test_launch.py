@@ -1,0 +1,96 @@
+"""Launches that skip Taichi's way do what it does, and refuse what it refuses."""
+
+import numpy as np
+import pytest
+import taichi as ti
+
+from passpmp_ti.kernels.launch import kernel
+
+Values = ti.types.ndarray(dtype=ti.f32, ndim=1)
+
+
+@kernel
+def scaled(
+    power: ti.template(), values: Values, factor: ti.f32, offset: ti.i32, seed: ti.u32, out: Values
+):
+    for n in range(values.shape[0]):
+        result = values[n] * factor + offset + ti.cast(seed, ti.f32)
+        for _ in ti.static(range(power - 1)):
+            result *= values[n]
+        out[n] = result
+
+
+@kernel
+def counted(values: Values) -> ti.i32:
+    total = 0
+    ti.loop_config(serialize=True)
+    for n in range(values.shape[0]):
+        if values[n] > 0:
+            total += 1
+    return total
+
+
+def values(count=5):
+    return np.linspace(-1, 2, count, dtype=np.float32)
+
+
+@pytest.mark.parametrize("power", [1, 2])
+@pytest.mark.parametrize("count", [1, 5, 1000])
+def test_later_launches_are_the_first_one_again(power, count):
+    given = values(count)
+    outs = [np.empty(count, dtype=np.float32) for _ in range(4)]
+    for out in outs[:3]:
+        scaled(power, given, 3.0, 2, 7, out)
+    scaled.plain(power, given, 3.0, 2, 7, outs[3])
+    assert all(out.tobytes() == outs[3].tobytes() for out in outs)
+    assert outs[3] == pytest.approx((given * 3 + 9) * given ** (power - 1))
+
+
+def test_arguments_are_those_of_each_launch():
+    for shift in range(4):
+        given, out = values(7) + shift, np.empty(7, dtype=np.float32)
+        scaled(1, given, 0.5 * shift, -shift, shift, out)
+        assert out == pytest.approx(given * 0.5 * shift)
+
+
+def test_arrays_of_a_device_and_of_the_host_may_take_turns():
+    given = values()
+    there, back = ti.ndarray(ti.f32, 5), ti.ndarray(ti.f32, 5)
+    there.from_numpy(given)
+    for _ in range(3):
+        out = np.empty(5, dtype=np.float32)
+        scaled(1, given, 2.0, 0, 0, out)
+        scaled(1, there, 2.0, 0, 0, back)
+        assert (back.to_numpy() == out).all()
+
+
+def test_what_a_kernel_returns_comes_back():
+    assert [counted(values()) for _ in range(3)] == [counted.plain(values())] * 3
+    assert counted(-np.ones(3, dtype=np.float32)) == 0
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        np.zeros(5),  # float64
+        np.zeros((5, 1), dtype=np.float32),
+        np.zeros(10, dtype=np.float32)[::2],
+        [0.0, 1.0],
+        None,
+    ],
+)
+def test_what_taichi_refuses_stays_refused(wrong):
+    out = np.empty(5, dtype=np.float32)
+    for _ in range(2):
+        scaled(1, values(), 1.0, 0, 0, out)
+    with pytest.raises(Exception):  # noqa: B017, PT011 - whatever Taichi raises
+        scaled(1, wrong, 1.0, 0, 0, out)
+
+
+def test_numbers_of_numpy_count_as_numbers():
+    outs = [np.empty(5, dtype=np.float32) for _ in range(3)]
+    scaled(1, values(), 1.5, 2, 3, outs[0])
+    scaled(1, values(), 1.5, 2, 3, outs[1])
+    scaled(1, values(), np.float32(1.5), np.int64(2), np.int32(3), outs[2])
+    assert (outs[0] == outs[1]).all()
+    assert (outs[0] == outs[2]).all()
