@@ -110,8 +110,8 @@ def _start(arch: str, options: dict[str, object]) -> None:
 def _shorten_first_compilation() -> None:
     """Let Taichi not wrap the source lines that it keeps for its error messages.
 
-    It prepares a message for every expression that it reads, and wrapping them takes a third of
-    the time in which a kernel is made ready, out of the cache too. The lines stay, in full length.
+    It prepares a message for every expression that it reads, and wrapping them takes a quarter of
+    a first cycle even where every kernel is in the cache. The lines stay, in full length.
     """
     from taichi.lang.ast import ast_transformer_utils
 
