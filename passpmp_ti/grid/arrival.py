@@ -15,7 +15,7 @@ from passpmp_ti.grid.view import Views
 from passpmp_ti.grid.window import Window
 from passpmp_ti.kernels.arrival import CHUNK, KINDS, LANES, arrival_times
 from passpmp_ti.kernels.beams import SLACK
-from passpmp_ti.kernels.visibility import mark_sources, see_cells
+from passpmp_ti.kernels.visibility import rasterise
 from passpmp_ti.robots import Robot
 from passpmp_ti.settings import Settings
 
@@ -29,13 +29,13 @@ BORDER = 1
 
 def rasterised(views: Views, window: Window, settings: Settings) -> tuple[np.ndarray, np.ndarray]:
     """(seen [J, I] uint8, 1: all of the cell proven empty; marks [5, J, I] uint8, 0 marks)."""
-    seen = np.empty((window.size, window.size), dtype=np.uint8)
+    seen = np.zeros((window.size, window.size), dtype=np.uint8)
     marks = np.ones((5, window.size, window.size), dtype=np.uint8)
-    i0, j0 = window.corner
-    see_cells(views.view, views.beams, views.reach, i0, j0, window.cell, seen)
-    mark_sources(
+    rasterise(
         views.view, views.beams, views.ranges, views.met, views.reach, views.far_side,
-        views.scans, int(_apart(settings)), i0, j0, window.cell, 2 * settings.range_noise + SLACK, marks,
+        views.scans, int(_apart(settings)), *window.corner, window.cell,
+        2 * settings.range_noise + SLACK, np.empty((*views.reach.shape, 8), dtype=np.float32),
+        seen, marks,
     )  # fmt: skip
     return seen, marks
 

@@ -7,6 +7,7 @@ dist(p, static or unseen) <= clearance: DESIGN of the conservative model, Fig. 4
 import taichi as ti
 
 from passpmp_ti.kernels.beams import SLACK
+from passpmp_ti.kernels.spread import spread, spread_over
 
 NEVER = 65535
 LATEST = 65534
@@ -22,7 +23,6 @@ FAR = 1 << 14
 """[cells] farther than any window is wide; its square and another's still fit an i32."""
 NO_SEED = 1e6
 """[cells] where nothing is marked anywhere."""
-PARTS = 64
 UNSEEN, SOURCE, SOURCE_LEFT, BLIND, BLIND_LEFT = range(5)
 KINDS = 5
 """Of marks that distances are taken to."""
@@ -144,19 +144,6 @@ def row_of(ticks: ti.template(), j, i):
 def is_wanted(kind, opened, blind_speed):
     """Whether there are marks of a kind to be asked about."""
     return (kind < BLIND or blind_speed > 0.0) and (kind % 2 == 1 or kind == UNSEEN or opened == 1)
-
-
-@ti.func
-def spread_over(count):
-    return (count + PARTS - 1) // PARTS * PARTS
-
-
-@ti.func
-def spread(task, count):
-    """The piece of work of a task: neighbours are far apart, so that threads, which are handed
-    long runs of tasks, find as much to do as each other; `count` and more: none."""
-    along = spread_over(count) // PARTS
-    return task % along * PARTS + task // along
 
 
 @ti.func
