@@ -63,6 +63,13 @@ def empty(shape: tuple[int, ...], dtype: Any, lanes: int = 0) -> Array:
     return ti.ndarray(ti.types.vector(lanes, kind) if lanes else kind, shape)
 
 
+def full(shape: tuple[int, ...], value: int, dtype: Any) -> Array:
+    """An array that holds `value` everywhere."""
+    array = empty(shape, dtype)
+    array.fill(value)
+    return array
+
+
 def put(values: np.ndarray) -> Array:
     """`values` where the kernels read them; on the CPU the very same array."""
     if not resident() or not isinstance(values, np.ndarray):

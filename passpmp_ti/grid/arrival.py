@@ -15,7 +15,7 @@ from passpmp_ti.grid.view import Views
 from passpmp_ti.grid.window import Window
 from passpmp_ti.kernels.arrival import CHUNK, KINDS, LANES, arrival_times
 from passpmp_ti.kernels.beams import SLACK
-from passpmp_ti.kernels.visibility import rasterise
+from passpmp_ti.kernels.visibility import BLIND_SOURCES, rasterise
 from passpmp_ti.robots import Robot
 from passpmp_ti.settings import Settings
 
@@ -27,15 +27,17 @@ BORDER = 1
 """Cells by which two cells are nearer than their centres along each axis: any points of them."""
 
 
-def rasterised(views: Views, window: Window, settings: Settings) -> tuple[np.ndarray, np.ndarray]:
+def rasterised(
+    views: Views, window: Window, settings: Settings
+) -> tuple[device.Array, device.Array]:
     """(seen [J, I] uint8, 1: all of the cell proven empty; marks [5, J, I] uint8, 0 marks)."""
-    seen = np.zeros((window.size, window.size), dtype=np.uint8)
-    marks = np.ones((5, window.size, window.size), dtype=np.uint8)
+    seen = device.full((window.size, window.size), 0, np.uint8)
+    marks = device.full((5, window.size, window.size), 1, np.uint8)
+    arrays = (views.view, views.beams, views.ranges, views.met, views.reach, views.far_side)
     rasterise(
-        views.view, views.beams, views.ranges, views.met, views.reach, views.far_side,
-        views.scans, int(_apart(settings)), *window.corner, window.cell,
-        2 * settings.range_noise + SLACK, np.empty((*views.reach.shape, 8), dtype=np.float32),
-        seen, marks,
+        *(device.put(array) for array in arrays), views.scans, int(_apart(settings)),
+        *window.corner, window.cell, 2 * settings.range_noise + SLACK,
+        device.empty((*views.reach.shape, 8), np.float32), seen, marks,
     )  # fmt: skip
     return seen, marks
 
@@ -49,19 +51,20 @@ class _Scratch(threading.local):
     """What each thread's kernels work in from cycle to cycle: fresh memory is slow to come by."""
 
     def __init__(self) -> None:
-        self._arrays: dict[int, tuple[device.Array, device.Array]] = {}
+        self._arrays: dict[tuple[int, bool], tuple[device.Array, device.Array]] = {}
 
     def __call__(self, size: int) -> tuple[device.Array, device.Array]:
         """Squared distances, and the least of each chunk of rows, of a window of `size` cells."""
-        if size not in self._arrays:
+        key = size, device.resident()
+        if key not in self._arrays:
             blocks = size // LANES
             self._arrays = {
-                size: (
+                key: (
                     device.empty((KINDS, size, blocks), np.int32, LANES),
                     device.empty((KINDS, size // CHUNK, blocks), np.int32),
                 )
             }
-        return self._arrays[size]
+        return self._arrays[key]
 
 
 _scratch = _Scratch()
@@ -87,14 +90,14 @@ def _unseen_square(cell: float, clearance: float) -> int:
 
 def arrival(
     views: Views,
-    seen: np.ndarray,
-    marks: np.ndarray,
+    seen: device.Array,
+    marks: device.Array,
     window: Window,
     base: int,
     robot: Robot,
     settings: Settings,
     previous: FutureModel | None,
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+) -> tuple[device.Array, device.Array, np.ndarray]:
     """When something could first be where.
 
     Args:
@@ -113,7 +116,10 @@ def arrival(
     # Views whose poses err apart leave less of a disc hidden, by no more than one error; how far
     # the rest of it reaches is inside the clearance, as the scan's error.
     size = settings.object_radius - settings.localisation_error
-    left = opened_sources(seen, marks, window.cell, size) if size > 0 else marks
+    left = marks
+    if size > 0:
+        hidden, sources = device.host(seen), device.host(marks)
+        left = device.put(opened_sources(hidden, sources, window.cell, size))
 
     clearance = settings.clearance(robot)
     broken = np.zeros((0, 2))
@@ -124,9 +130,10 @@ def arrival(
         broken = broken_premises(previous, views, window, age, robot, settings)
         if len(broken):
             memory = without_intruders(previous, broken, age, clearance, settings)
-    ticks = np.empty(seen.shape, dtype=np.uint16)
-    # where nothing is apart, nothing is marked as blind
-    blind_speed = settings.unseen_speed if _apart(settings) else 0.0
+    ticks = device.empty((window.size, window.size), np.uint16)
+    blind_speed = 0.0  # nothing is asked about where nothing is marked
+    if _apart(settings) and (device.resident() or not marks[BLIND_SOURCES].all()):
+        blind_speed = settings.unseen_speed
     arrival_times(
         seen, marks, left, memory, *shift, age, BORDER, _unseen_square(window.cell, clearance),
         int(size > 0), window.cell, clearance, settings.object_speed, blind_speed,

@@ -239,12 +239,13 @@ def arrival_times(
 def cap_memory(
     # in
     to_intruder: Distances,
+    previous: Arrival,
     cell: ti.f32,
     clearance: ti.f32,
     speed: ti.f32,
     stamp_error: ti.f32,
     age: ti.i32,
-    # in / out
+    # out
     remembered: Arrival,
 ):
     """Let memory promise nothing that the intruders seen now could break."""
@@ -254,7 +255,7 @@ def cap_memory(
         if ticks != NEVER:
             # counted from the old base, as the memory is
             ticks = ti.min(ticks + age, LATEST)
-        kept = ti.cast(remembered[j, i], ti.i32)
+        kept = ti.cast(previous[j, i], ti.i32)
         if distance <= 0.0:
             ticks = 0
         remembered[j, i] = ti.cast(ti.min(kept, ticks), ti.u16)
