@@ -107,7 +107,7 @@ def without_intruders(
     # whoever stands there reaches behind the surface that was seen
     grown = clearance + settings.object_width
     cap_memory(
-        device.put(distance_between_cells(mask)), device.put(previous.ticks), window.cell, grown, settings.object_speed,
-        settings.stamp_error, age, remembered,
+        device.put(distance_between_cells(mask)), device.put(previous.ticks), window.cell, grown,
+        settings.object_speed, settings.stamp_error, age, remembered,
     )  # fmt: skip
     return remembered

@@ -49,30 +49,38 @@ def aged(ticks, age):
 
 
 @ti.func
-def unmarked(kind: ti.template(), seen: ti.template(), marks: ti.template(), left: ti.template(),
-             j, i):
+def unmarked(seen: ti.template(), marks: ti.template(), left: ti.template(), kind, j, i):
     """[LANES] 0 where the row's cells from i on are marked."""
     cells = vec(0)
-    for lane in ti.static(range(LANES)):
-        if ti.static(kind == UNSEEN):
+    if kind == UNSEEN:
+        for lane in ti.static(range(LANES)):
             cells[lane] = ti.cast(seen[j, i + lane], ti.i32)
-        elif ti.static(kind in (SOURCE, BLIND)):
+    elif kind % 2 == 1:
+        for lane in ti.static(range(LANES)):
             cells[lane] = ti.cast(marks[kind // BLIND, j, i + lane], ti.i32)
-        else:
+    else:
+        for lane in ti.static(range(LANES)):
             cells[lane] = ti.cast(left[kind // BLIND, j, i + lane], ti.i32)
     return cells
 
 
 @ti.func
-def square_along_row(kind: ti.template(), seen: ti.template(), marks: ti.template(),
-                     left: ti.template(), squares: ti.template(), j, border):
+def square_along_row(
+    seen: ti.template(),
+    marks: ti.template(),
+    left: ti.template(),
+    squares: ti.template(),
+    kind,
+    j,
+    border,
+):
     """Squared distance to the nearest mark of the same row, less the border of both cells."""
     ramp = vec(0)
     for lane in ti.static(range(LANES)):
         ramp[lane] = lane + 1
     away = FAR
     for b in range(squares.shape[2]):
-        cells = unmarked(kind, seen, marks, left, j, b * LANES)
+        cells = unmarked(seen, marks, left, kind, j, b * LANES)
         steps = away + ramp
         if cells.min() == 0:
             for lane in ti.static(range(LANES)):
@@ -185,9 +193,9 @@ def arrival_times(
     blocks = arrival.shape[1] // LANES
     chunks = rows // CHUNK
     for task in range(KINDS * rows):
-        for kind in ti.static(range(KINDS)):
-            if task % KINDS == kind and is_wanted(kind, opened, blind_speed):
-                square_along_row(kind, seen, marks, left, squares, task // KINDS, border)
+        kind = task % KINDS
+        if is_wanted(kind, opened, blind_speed):
+            square_along_row(seen, marks, left, squares, kind, task // KINDS, border)
     for task in range(KINDS * chunks * blocks):
         kind = task // (chunks * blocks)
         if is_wanted(kind, opened, blind_speed):

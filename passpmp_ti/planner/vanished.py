@@ -92,16 +92,16 @@ def vanished(before: FutureModel, now: FutureModel, *, timeless: bool = False) -
         if passed.any():
             j, i = j[passed], i[passed]
             squares.append(np.stack([j, i, np.full(len(i), reach)], axis=1))
-    gone = _empty(now.seen_cells, np.concatenate(squares)) if squares else 0
+    gone = _empty(seen, np.concatenate(squares)) if squares else 0
     if gone >= FEWEST and gone >= LEAST_SHARE * asked:
         return f"{gone} of {asked} surfaces are gone that cannot be"
     return ""
 
 
-def _empty(seen: device.Array, squares: np.ndarray) -> int:
+def _empty(seen: np.ndarray, squares: np.ndarray) -> int:
     """How many squares [n, 3] (row, column, cells to each side) are seen whole."""
     if len(squares) < FEWEST:
         return 0  # too few to matter
     empty = device.empty((len(squares),), np.int32)
-    squares_empty(device.put(seen), device.put(squares.astype(np.int32)), empty)
+    squares_empty(device.put(seen.view(np.uint8)), device.put(squares.astype(np.int32)), empty)
     return int(device.host(empty).sum())
