@@ -323,6 +323,7 @@ def mark_piece(
 ):
     """Walk a border piece from (r, bearing), `outwards` metres and `across` radians, and mark the
     cells that hold its samples, except where a view keeps movers out."""
+    apart = blind_apart == 1 and (side == UNCOVERED or v >= scans)
     c = ti.cos(bearing)
     s = ti.sin(bearing)
     pieces = ti.cast((outwards + r * across) / (0.125 * cell), ti.i32) + 1
@@ -334,17 +335,22 @@ def mark_piece(
             s = ti.sin(at_bearing)
         x = view[v, 0] + at_r * c
         y = view[v, 1] + at_r * s
-        inside = False
-        for w in range(view.shape[0]):
-            if not inside:
-                inside = keeps_out(
-                    view, beams[w], ranges, reach, far_side, rays, w, x, y, tolerance, cell
-                )
         i = ti.cast(ti.floor(x / cell), ti.i32) - corner_i
         j = ti.cast(ti.floor(y / cell), ti.i32) - corner_j
-        if not inside and i >= 0 and j >= 0 and i < marks.shape[2] and j < marks.shape[1]:
-            apart = side == UNCOVERED or v >= scans
-            if apart and blind_apart == 1 and not covered(view, beams, scans, x, y):
+        open_ = i >= 0 and j >= 0 and i < marks.shape[2] and j < marks.shape[1]
+        if open_ and not apart:
+            # most samples have one in the same cell before them that said all that they could say
+            open_ = marks[SOURCES, j, i] != 0
+            if side == STANDING and marks[STANDING_SOURCES, j, i] != 0:
+                open_ = True
+        w = 0
+        while open_ and w < view.shape[0]:
+            open_ = not keeps_out(
+                view, beams[w], ranges, reach, far_side, rays, w, x, y, tolerance, cell
+            )
+            w += 1
+        if open_:
+            if apart and not covered(view, beams, scans, x, y):
                 marks[BLIND_SOURCES, j, i] = ti.u8(0)
             else:
                 marks[SOURCES, j, i] = ti.u8(0)
