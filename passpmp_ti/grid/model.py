@@ -130,11 +130,10 @@ class FutureModel:
         )
         seen, marks = rasterised(views, window, settings)
         base = math.floor(stamp / TICK + 1e-6)
-        body = Body.of(robot, settings)
+        same = previous is not None and previous.robot is robot and previous.settings is settings
+        body = previous.body if previous is not None and same else Body.of(robot, settings)
         ticks, marks, broken = arrival(views, seen, marks, window, base, robot, settings, previous)
-        return cls(
-            robot, settings, window, stamp, base, ticks, seen, marks, views, broken, body
-        )
+        return cls(robot, settings, window, stamp, base, ticks, seen, marks, views, broken, body)
 
     @property
     def origin(self) -> tuple[float, float]:

@@ -90,9 +90,7 @@ def turn(view: ti.template(), beams: ti.template(), rays: ti.template(), v, w):
 
 
 @ti.func
-def proves_cell(
-    view: ti.template(), n, reach: ti.template(), rays: ti.template(), v, x, y, cell
-):
+def proves_cell(view: ti.template(), n, reach: ti.template(), rays: ti.template(), v, x, y, cell):
     """Whether view v proves every point of the cell centred at (x, y) empty.
 
     Wedge by wedge: the farthest point of the cell in it must be within the wedge's reach. That
@@ -270,9 +268,7 @@ def see_block(
             for quarter in range(4):
                 i = i0 + quarter % 2 * (side // 2)
                 j = j0 + quarter // 2 * (side // 2)
-                see_block(
-                    view, beams, reach, rays, seen, i, j, corner_i, corner_j, cell, side // 2
-                )
+                see_block(view, beams, reach, rays, seen, i, j, corner_i, corner_j, cell, side // 2)
         else:
             for dj in range(side):
                 for di in range(side):
