@@ -8,7 +8,7 @@ from scipy.ndimage import binary_dilation, distance_transform_edt
 from passpmp_ti.grid.arrival import _scratch, _unseen_square
 from passpmp_ti.kernels.arrival import LATEST, NEVER, SAMPLING, arrival_times
 from passpmp_ti.kernels.beams import SLACK
-from passpmp_ti.kernels.spread import PARTS, spread, spread_over
+from passpmp_ti.kernels.spread import PARTS, evens_first, spread, spread_over
 
 SIZE, CELL, CLEARANCE = 96, 0.1, 0.43
 SPEED, BLIND_SPEED = 1.5, 0.7
@@ -79,10 +79,12 @@ def count_pieces(counts: ti.types.ndarray(dtype=ti.i32, ndim=1)):
         piece = spread(index, counts.shape[0])
         if piece < counts.shape[0]:
             counts[piece] += 1
+    for index in range(counts.shape[0]):
+        counts[evens_first(index, counts.shape[0])] += 1
 
 
 @pytest.mark.parametrize("count", [1, PARTS - 1, PARTS, PARTS + 1, 1000])
-def test_work_that_is_spread_is_done_once(count):
+def test_work_in_another_order_is_done_once(count):
     counts = np.zeros(count, dtype=np.int32)
     count_pieces(counts)
-    assert (counts == 1).all()
+    assert (counts == 2).all()

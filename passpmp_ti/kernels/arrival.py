@@ -7,7 +7,7 @@ dist(p, static or unseen) <= clearance: DESIGN of the conservative model, Fig. 4
 import taichi as ti
 
 from passpmp_ti.kernels.beams import SLACK
-from passpmp_ti.kernels.spread import spread, spread_over
+from passpmp_ti.kernels.spread import evens_first
 
 NEVER = 65535
 LATEST = 65534
@@ -210,37 +210,36 @@ def arrival_times(
     # apart, so where another view takes over, what comes out may do so an eighth of a cell from
     # the last mark, and another eighth is forgiven behind a standing surface.
     taken = 1e-3 * cell + SLACK + SAMPLING * cell + clearance
-    for task in range(spread_over(chunks * blocks)):
-        place = spread(task, chunks * blocks)
-        if place < chunks * blocks:
-            b = place % blocks
-            for row in range(CHUNK):
-                j = place // blocks * CHUNK + row
-                most = vec(unseen_square + 1)
-                ticks = vec(0)
-                come = vec(0)
-                for kind in range(KINDS):
-                    if most.max() > 0 and is_wanted(kind, opened, blind_speed):
-                        square = nearest(squares, least, kind, j, b, border, most)
-                        if kind == UNSEEN:
-                            free = square > unseen_square
-                            most = ti.select(free, FAR * FAR, 0)
-                            ticks = ti.select(free, NEVER, 0)
-                        else:
-                            pace = ti.select(kind < BLIND, speed, blind_speed)
-                            way = way_to(square, border) * cell - taken
-                            after = arrival_ticks(way, pace, stamp_error)
-                            # what comes out must have come by both sets of marks
-                            come = ti.max(come, after)
-                            if kind == SOURCE + opened or kind == BLIND + opened:
-                                ticks = ti.min(ticks, come)
-                                come = vec(0)
-                pj = j + shift_j
-                if age >= 0 and pj >= 0 and pj < previous.shape[0]:
-                    remembered = row_of(previous, pj, b * LANES + shift_i)
-                    ticks = ti.max(ticks, aged(remembered, age))
-                for lane in ti.static(range(LANES)):
-                    arrival[j, b * LANES + lane] = ti.cast(ticks[lane], ti.u16)
+    # down the columns: most of what one piece of work read is what the next one reads
+    for task in range(chunks * blocks):
+        b = evens_first(task // chunks, blocks)
+        for row in range(CHUNK):
+            j = task % chunks * CHUNK + row
+            most = vec(unseen_square + 1)
+            ticks = vec(0)
+            come = vec(0)
+            for kind in range(KINDS):
+                if most.max() > 0 and is_wanted(kind, opened, blind_speed):
+                    square = nearest(squares, least, kind, j, b, border, most)
+                    if kind == UNSEEN:
+                        free = square > unseen_square
+                        most = ti.select(free, FAR * FAR, 0)
+                        ticks = ti.select(free, NEVER, 0)
+                    else:
+                        pace = ti.select(kind < BLIND, speed, blind_speed)
+                        way = way_to(square, border) * cell - taken
+                        after = arrival_ticks(way, pace, stamp_error)
+                        # what comes out must have come by both sets of marks
+                        come = ti.max(come, after)
+                        if kind == SOURCE + opened or kind == BLIND + opened:
+                            ticks = ti.min(ticks, come)
+                            come = vec(0)
+            pj = j + shift_j
+            if age >= 0 and pj >= 0 and pj < previous.shape[0]:
+                remembered = row_of(previous, pj, b * LANES + shift_i)
+                ticks = ti.max(ticks, aged(remembered, age))
+            for lane in ti.static(range(LANES)):
+                arrival[j, b * LANES + lane] = ti.cast(ticks[lane], ti.u16)
 
 
 @ti.kernel

@@ -21,3 +21,12 @@ def spread(index, count):
     """The piece of work of an index; `count` and more: there is none."""
     along = spread_over(count) // PARTS
     return index % along * PARTS + index // along
+
+
+@ti.func
+def evens_first(index, count):
+    """0, 2, 4, ... and then 1, 3, ... below `count`: for pieces that come in columns."""
+    piece = 2 * index
+    if piece >= count:
+        piece -= count - (count + 1) % 2
+    return piece
