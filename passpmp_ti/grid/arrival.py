@@ -60,7 +60,7 @@ class _Scratch(threading.local):
             blocks = size // LANES
             self._arrays = {
                 key: (
-                    device.empty((KINDS, size, blocks), np.int32, LANES),
+                    device.empty((KINDS * size * blocks,), np.int32, LANES),
                     device.empty((KINDS, size // CHUNK, blocks), np.int32),
                 )
             }

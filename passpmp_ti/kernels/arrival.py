@@ -72,6 +72,7 @@ def square_along_row(
     squares: ti.template(),
     kind,
     j,
+    blocks,
     border,
 ):
     """Squared distance to the nearest mark of the same row, less the border of both cells."""
@@ -79,7 +80,8 @@ def square_along_row(
     for lane in ti.static(range(LANES)):
         ramp[lane] = lane + 1
     away = FAR
-    for b in range(squares.shape[2]):
+    row = (kind * seen.shape[0] + j) * blocks
+    for b in range(blocks):
         cells = unmarked(seen, marks, left, kind, j, b * LANES)
         steps = away + ramp
         if cells.min() == 0:
@@ -87,11 +89,11 @@ def square_along_row(
                 away = ti.select(cells[lane] == 0, 0, away + 1)
                 steps[lane] = away
         away = ti.min(steps[LANES - 1], FAR)
-        squares[kind, j, b] = ti.min(steps, FAR)
+        squares[row + b] = ti.min(steps, FAR)
     away = FAR
-    for back in range(squares.shape[2]):
-        b = squares.shape[2] - 1 - back
-        ahead = squares[kind, j, b]
+    for back in range(blocks):
+        at = row + blocks - 1 - back
+        ahead = squares[at]
         steps = away + (LANES + 1) - ramp
         if ahead.min() == 0:
             for back_lane in ti.static(range(LANES)):
@@ -100,7 +102,7 @@ def square_along_row(
                 steps[lane] = away
         away = ti.min(steps[0], FAR)
         apart = ti.max(ti.min(steps, ahead) - border, 0)
-        squares[kind, j, b] = apart * apart
+        squares[at] = apart * apart
 
 
 @ti.func
@@ -109,6 +111,7 @@ def nearest(squares: ti.template(), least: ti.template(), kind: ti.template(), j
 
     Rows are asked from the nearest on, and passed over by chunks that cannot matter any more.
     """
+    blocks = least.shape[2]
     worst = best.max()
     going = worst > 0
     step = 0
@@ -125,10 +128,10 @@ def nearest(squares: ti.template(), least: ti.template(), kind: ti.template(), j
                 going = True
                 if least[kind, chunk, b] + gap < worst:
                     # unrolled: only then do lanes become the CPU's own vectors
+                    first = (kind * least.shape[1] + chunk) * CHUNK * blocks + b
                     for row in ti.static(range(CHUNK)):
                         apart = ti.max(ti.abs(chunk * CHUNK + row - j) - border, 0)
-                        square = squares[kind, chunk * CHUNK + row, b] + apart * apart
-                        best = ti.min(best, square)
+                        best = ti.min(best, squares[first + row * blocks] + apart * apart)
                     worst = best.max()
         step += 1
     return best
@@ -180,7 +183,7 @@ def arrival_times(
     blind_speed: ti.f32,
     stamp_error: ti.f32,
     # scratch
-    squares: ti.types.ndarray(dtype=vec, ndim=3),  # [KINDS, J, I / LANES]
+    squares: ti.types.ndarray(dtype=vec, ndim=1),  # [KINDS x J x I / LANES]
     least: ti.types.ndarray(dtype=ti.i32, ndim=3),  # [KINDS, J / CHUNK, I / LANES]
     # out
     arrival: Arrival,
@@ -195,15 +198,16 @@ def arrival_times(
     for task in range(KINDS * rows):
         kind = task % KINDS
         if is_wanted(kind, opened, blind_speed):
-            square_along_row(seen, marks, left, squares, kind, task // KINDS, border)
+            square_along_row(seen, marks, left, squares, kind, task // KINDS, blocks, border)
     for task in range(KINDS * chunks * blocks):
         kind = task // (chunks * blocks)
         if is_wanted(kind, opened, blind_speed):
             chunk = task // blocks % chunks
             b = task % blocks
-            low = squares[kind, chunk * CHUNK, b]
+            first = (kind * chunks + chunk) * CHUNK * blocks + b
+            low = squares[first]
             for row in ti.static(range(1, CHUNK)):
-                low = ti.min(low, squares[kind, chunk * CHUNK + row, b])
+                low = ti.min(low, squares[first + row * blocks])
             least[kind, chunk, b] = low.min()
 
     # Distances are between cells, any point of either. A source's samples are an eighth of a cell
