@@ -53,13 +53,21 @@ def share() -> int:
     return 1 if resident() else SHARE
 
 
-def empty(shape: tuple[int, ...], dtype: Any) -> Array:
-    """An array whose values are not set."""
+def empty(shape: tuple[int, ...], dtype: Any, lanes: int = 0) -> Array:
+    """An array whose values are not set; of vectors of `lanes` numbers, if any."""
     if not resident():
-        return np.empty(shape, dtype=dtype)
+        return np.empty((*shape, lanes) if lanes else shape, dtype=dtype)
     import taichi as ti
 
-    return ti.ndarray(_taichi_type(dtype), shape)
+    kind = _taichi_type(dtype)
+    return ti.ndarray(ti.types.vector(lanes, kind) if lanes else kind, shape)
+
+
+def full(shape: tuple[int, ...], value: int, dtype: Any) -> Array:
+    """An array that holds `value` everywhere."""
+    array = empty(shape, dtype)
+    array.fill(value)
+    return array
 
 
 def put(values: np.ndarray) -> Array:

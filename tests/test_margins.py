@@ -13,7 +13,6 @@ from oracle import attack, cases, exact, hidden
 import passpmp_ti.grid.arrival as arrival_module
 import passpmp_ti.grid.model as model_module
 from passpmp_ti import DifferentialDrive, FutureModel, Scan, Settings
-from passpmp_ti.grid.distance import distance_to_zeros
 from passpmp_ti.kernels.beams import SLACK
 
 MOUSE = DifferentialDrive(discs=((0.0, 0.1),), wheel_speed=2.0, acceleration=4.0, track=1.5)
@@ -90,7 +89,7 @@ def broken(claim, truth=None, shift=(0.0, 0.0), attackers=0, later=0.0, seeds=3,
 def test_the_extent_of_cells(monkeypatch):
     case = seen(WALLS_ONLY, FINE.changed(cell=0.2))
     assert broken(case) == 0
-    monkeypatch.setattr(arrival_module, "distance_between_cells", distance_to_zeros)
+    monkeypatch.setattr(arrival_module, "BORDER", 0)
     assert broken(case) > 0
 
 

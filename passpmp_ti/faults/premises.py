@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from passpmp_ti import device
 from passpmp_ti.faults.grounds import Ground
 from passpmp_ti.faults.movers import SteppedMovers, places_for
 from passpmp_ti.grid.model import FutureModel
@@ -93,7 +94,8 @@ def deepest_return(before: FutureModel, scans: list[Scan]) -> float:
         return -math.inf
     radius, cell = before.robot.disc_radius, before.cell
     now = math.floor(scans[0].stamp * 1000 + 1e-3) - before.base_ticks
-    later = (before.ticks.astype(np.int64) > now + 2) | (before.ticks == NEVER)
+    ticks = device.host(before.ticks).astype(np.int64)
+    later = (ticks > now + 2) | (ticks == NEVER)
     span = math.ceil(radius / cell) + 1
     offsets = np.arange(-span, span + 1)
     at = np.floor((points - np.array(before.origin)) / cell).astype(int)

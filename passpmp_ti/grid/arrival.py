@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-import functools
+import math
+import threading
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from passpmp_ti.grid.distance import NO_SEED, distance_between_cells
+from passpmp_ti import device
 from passpmp_ti.grid.memory import broken_premises, remembered_ticks, without_intruders
 from passpmp_ti.grid.opening import opened_sources
 from passpmp_ti.grid.view import Views
 from passpmp_ti.grid.window import Window
-from passpmp_ti.kernels.arrival import arrival_times
+from passpmp_ti.kernels.arrival import CHUNK, KINDS, LANES, arrival_times
 from passpmp_ti.kernels.beams import SLACK
-from passpmp_ti.kernels.visibility import BLIND_SOURCES, SOURCES, mark_sources, see_cells
+from passpmp_ti.kernels.visibility import BLIND_SOURCES, rasterise
 from passpmp_ti.robots import Robot
 from passpmp_ti.settings import Settings
 
@@ -22,44 +23,81 @@ if TYPE_CHECKING:
     from passpmp_ti.grid.model import FutureModel
 
 
-def rasterised(views: Views, window: Window, settings: Settings) -> tuple[np.ndarray, np.ndarray]:
+BORDER = 1
+"""Cells by which two cells are nearer than their centres along each axis: any points of them."""
+
+
+def rasterised(
+    views: Views, window: Window, settings: Settings
+) -> tuple[device.Array, device.Array]:
     """(seen [J, I] uint8, 1: all of the cell proven empty; marks [5, J, I] uint8, 0 marks)."""
-    seen = np.empty((window.size, window.size), dtype=np.uint8)
-    marks = np.ones((5, window.size, window.size), dtype=np.uint8)
-    i0, j0 = window.corner
-    see_cells(views.view, views.beams, views.reach, i0, j0, window.cell, seen)
-    apart = settings.unseen_speed < settings.object_speed
-    mark_sources(
-        views.view, views.beams, views.ranges, views.met, views.reach, views.far_side,
-        views.scans, int(apart), i0, j0, window.cell, 2 * settings.range_noise + SLACK, marks,
+    seen = device.full((window.size, window.size), 0, np.uint8)
+    marks = device.full((5, window.size, window.size), 1, np.uint8)
+    arrays = (views.view, views.beams, views.ranges, views.met, views.reach, views.far_side)
+    rasterise(
+        *(device.put(array) for array in arrays), views.scans, int(_apart(settings)),
+        *window.corner, window.cell, 2 * settings.range_noise + SLACK,
+        device.empty((*views.reach.shape, 8), np.float32), seen, marks,
     )  # fmt: skip
     return seen, marks
 
 
-@functools.cache
-def _nothing_near(size: int) -> np.ndarray:
-    """[size, size] distances where nothing is marked anywhere; only ever read."""
-    return np.full((size, size), NO_SEED, dtype=np.float32)
+def _apart(settings: Settings) -> bool:
+    """Whether what comes out of bearings that are never covered has its own bound of speed."""
+    return settings.unseen_speed < settings.object_speed
 
 
-def _to_sources(marks: np.ndarray, blind_speed: float) -> tuple[np.ndarray, np.ndarray]:
-    """[J, I] distances to the nearest source, and to the nearest blind one [cells]."""
-    to_source = distance_between_cells(marks[SOURCES])
-    if blind_speed > 0 and not marks[BLIND_SOURCES].all():
-        return to_source, distance_between_cells(marks[BLIND_SOURCES])
-    return to_source, _nothing_near(len(to_source))
+class _Scratch(threading.local):
+    """What each thread's kernels work in from cycle to cycle: fresh memory is slow to come by."""
+
+    def __init__(self) -> None:
+        self._arrays: dict[tuple[int, bool], tuple[device.Array, device.Array]] = {}
+
+    def __call__(self, size: int) -> tuple[device.Array, device.Array]:
+        """Squared distances, and the least of each chunk of rows, of a window of `size` cells."""
+        key = size, device.resident()
+        if key not in self._arrays:
+            blocks = size // LANES
+            self._arrays = {
+                key: (
+                    device.empty((KINDS * size * blocks,), np.int32, LANES),
+                    device.empty((KINDS, size // CHUNK, blocks), np.int32),
+                )
+            }
+        return self._arrays[key]
+
+
+_scratch = _Scratch()
+
+
+def _unseen_square(cell: float, clearance: float) -> int:
+    """The greatest squared distance [cells] to what is unseen at which a cell is not free.
+
+    In single precision, as the kernels compute.
+    """
+    side, rounding = np.float32(cell), np.float32(1e-3) * np.float32(cell) + np.float32(SLACK)
+
+    def free(square: int) -> bool:
+        return bool(np.sqrt(np.float32(square)) * side - rounding > np.float32(clearance))
+
+    square = math.floor((clearance / cell) ** 2)
+    while not free(square + 1):
+        square += 1
+    while free(square):
+        square -= 1
+    return square
 
 
 def arrival(
     views: Views,
-    seen: np.ndarray,
-    marks: np.ndarray,
+    seen: device.Array,
+    marks: device.Array,
     window: Window,
     base: int,
     robot: Robot,
     settings: Settings,
     previous: FutureModel | None,
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+) -> tuple[device.Array, device.Array, np.ndarray]:
     """When something could first be where.
 
     Args:
@@ -75,17 +113,13 @@ def arrival(
         Ticks [J, I] uint16; the marks, with the sources that are left of them where objects have a
         size; places [n, 2] of broken premises [m].
     """
-    blind_speed = settings.unseen_speed
-    to_source, to_blind = _to_sources(marks, blind_speed)
     # Views whose poses err apart leave less of a disc hidden, by no more than one error; how far
     # the rest of it reaches is inside the clearance, as the scan's error.
     size = settings.object_radius - settings.localisation_error
+    left = marks
     if size > 0:
-        marks = opened_sources(seen, marks, window.cell, size)
-        farther, blind_farther = _to_sources(marks, blind_speed)
-        to_source = np.maximum(to_source, farther)
-        to_blind = np.maximum(to_blind, blind_farther)
-    to_unseen = distance_between_cells(seen)
+        hidden, sources = device.host(seen), device.host(marks)
+        left = device.put(opened_sources(hidden, sources, window.cell, size))
 
     clearance = settings.clearance(robot)
     broken = np.zeros((0, 2))
@@ -96,9 +130,13 @@ def arrival(
         broken = broken_premises(previous, views, window, age, robot, settings)
         if len(broken):
             memory = without_intruders(previous, broken, age, clearance, settings)
-    ticks = np.empty(seen.shape, dtype=np.uint16)
+    ticks = device.empty((window.size, window.size), np.uint16)
+    blind_speed = 0.0  # nothing is asked about where nothing is marked
+    if _apart(settings) and (device.resident() or not marks[BLIND_SOURCES].all()):
+        blind_speed = settings.unseen_speed
     arrival_times(
-        to_source, to_blind, to_unseen, memory, shift[0], shift[1], age, window.cell, clearance,
-        settings.object_speed, blind_speed, settings.stamp_error, ticks,
+        seen, marks, left, memory, *shift, age, BORDER, _unseen_square(window.cell, clearance),
+        int(size > 0), window.cell, clearance, settings.object_speed, blind_speed,
+        settings.stamp_error, *_scratch(window.size), ticks,
     )  # fmt: skip
-    return ticks, marks, broken
+    return ticks, left, broken

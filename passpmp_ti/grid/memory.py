@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from passpmp_ti import device
 from passpmp_ti.grid.distance import distance_between_cells
 from passpmp_ti.grid.view import Views
 from passpmp_ti.grid.window import Window
@@ -62,9 +63,11 @@ def _assumptions(before: Settings, now: Settings, robot: Robot) -> list[tuple[st
     ]
 
 
-def remembered_ticks(previous: FutureModel | None) -> np.ndarray:
+def remembered_ticks(previous: FutureModel | None) -> device.Array:
     """What a model remembers: [J, I] uint16; one empty cell where there is no model."""
-    return np.zeros((1, 1), dtype=np.uint16) if previous is None else previous.ticks
+    if previous is None:
+        return device.put(np.zeros((1, 1), dtype=np.uint16))
+    return device.put(previous.ticks)
 
 
 def broken_premises(
@@ -83,28 +86,28 @@ def broken_premises(
     radius -= window.cell
     if not len(returns) or radius <= 0:
         return np.zeros((0, 2))
-    broken = np.zeros(len(returns), dtype=np.int32)
+    broken = device.empty((len(returns),), np.int32)
     contradicted(
-        (returns - np.array(previous.window.anchor)).astype(np.float32), previous.ticks, age,
-        *previous.window.corner, window.cell, radius, broken,
+        device.put((returns - np.array(previous.window.anchor)).astype(np.float32)),
+        previous.ticks, age, *previous.window.corner, window.cell, radius, broken,
     )  # fmt: skip
-    return returns[broken == 1]
+    return returns[device.host(broken) == 1]
 
 
 def without_intruders(
     previous: FutureModel, broken: np.ndarray, age: int, clearance: float, settings: Settings
-) -> np.ndarray:
+) -> device.Array:
     """Memory capped by cones from the places where a premise broke."""
     window = previous.window
-    mask = np.ones(previous.ticks.shape, dtype=np.uint8)
+    mask = np.ones(previous.shape, dtype=np.uint8)
     cells = np.floor((broken - np.array(window.origin)) / window.cell).astype(int)
     inside = ((cells >= 0) & (cells < window.size)).all(axis=1)
     mask[cells[inside, 1], cells[inside, 0]] = 0
-    remembered = previous.ticks.copy()
+    remembered = device.empty(previous.shape, np.uint16)
     # whoever stands there reaches behind the surface that was seen
     grown = clearance + settings.object_width
     cap_memory(
-        distance_between_cells(mask), window.cell, grown, settings.object_speed,
-        settings.stamp_error, age, remembered,
+        device.put(distance_between_cells(mask)), device.put(previous.ticks), window.cell, grown,
+        settings.object_speed, settings.stamp_error, age, remembered,
     )  # fmt: skip
     return remembered

@@ -48,11 +48,11 @@ class FutureModel:
     """t_k, when the scans were taken [s]."""
     base_ticks: int
     """Whole milliseconds at or before `stamp`; `ticks` count from here."""
-    ticks: np.ndarray
+    ticks: device.Array
     """[J, I] uint16 [ms]; 0: never free; 65535: never reached."""
-    seen: np.ndarray
-    """[J, I] bool: proven empty at `stamp`."""
-    marks: np.ndarray
+    seen_cells: device.Array
+    """[J, I] uint8, 1: proven empty at `stamp`."""
+    marks: device.Array
     """[5, J, I] uint8, 0 marks: sources, blind sources, sources behind standing things, static
     and movable surfaces."""
     views: Views
@@ -61,6 +61,8 @@ class FutureModel:
     _body: Body = field(repr=False)
     counts: device.Array = field(init=False, repr=False)
     """[15] int32 that the check's kernels read of the window and the robot."""
+    _copies: dict[str, np.ndarray] = field(default_factory=dict, init=False, repr=False)
+    """What has been brought to the host already."""
     spans: device.Array = field(init=False, repr=False)
     """[F] uint32: least and greatest ticks over blocks of cells, see kernels/spans.py."""
 
@@ -128,11 +130,10 @@ class FutureModel:
         )
         seen, marks = rasterised(views, window, settings)
         base = math.floor(stamp / TICK + 1e-6)
-        body = Body.of(robot, settings)
+        same = previous is not None and previous.robot is robot and previous.settings is settings
+        body = previous.body if previous is not None and same else Body.of(robot, settings)
         ticks, marks, broken = arrival(views, seen, marks, window, base, robot, settings, previous)
-        return cls(
-            robot, settings, window, stamp, base, ticks, seen.view(bool), marks, views, broken, body
-        )
+        return cls(robot, settings, window, stamp, base, ticks, seen, marks, views, broken, body)
 
     @property
     def origin(self) -> tuple[float, float]:
@@ -155,24 +156,30 @@ class FutureModel:
         return self.base_ticks * TICK
 
     @property
+    def seen(self) -> np.ndarray:
+        """[J, I] bool: proven empty at `stamp`."""
+        return self._on_host("seen_cells").view(bool)
+
+    @property
     def sources(self) -> np.ndarray:
         """[J, I] bool: cells that something may come out of."""
-        return (self.marks[SOURCES] == 0) | (self.marks[BLIND_SOURCES] == 0)
+        marks = self._on_host("marks")
+        return (marks[SOURCES] == 0) | (marks[BLIND_SOURCES] == 0)
 
     @property
     def standing_sources(self) -> np.ndarray:
         """[J, I] bool: sources from behind things that stand."""
-        return self.marks[STANDING_SOURCES] == 0
+        return self._on_host("marks")[STANDING_SOURCES] == 0
 
     @property
     def static(self) -> np.ndarray:
         """[J, I] bool: cells that hold a return from a surface that stays."""
-        return self.marks[STATIC_CELLS] == 0
+        return self._on_host("marks")[STATIC_CELLS] == 0
 
     @property
     def movable(self) -> np.ndarray:
         """[J, I] bool: cells that hold a return from a surface that may move."""
-        return self.marks[MOVABLE_CELLS] == 0
+        return self._on_host("marks")[MOVABLE_CELLS] == 0
 
     def ticks_of(self, times: np.ndarray | float) -> np.ndarray:
         """Absolute times [s] as ticks of this model, rounded up: a later time is less safe."""
@@ -200,7 +207,7 @@ class FutureModel:
         j = cells[:, 1] - self.window.corner[1]
         inside = (i >= 0) & (j >= 0) & (i < self.window.size) & (j < self.window.size)
         arrival = np.zeros(len(points), dtype=np.int64)
-        arrival[inside] = self.ticks[j[inside], i[inside]]
+        arrival[inside] = self._on_host("ticks")[j[inside], i[inside]]
         return (arrival <= ticks) & (arrival != NEVER)
 
     def passively_safe(self, states: np.ndarray, times: np.ndarray) -> np.ndarray:
@@ -264,7 +271,8 @@ class FutureModel:
         """
         index = door.whole("FutureModel", "layer", index, least=0)
         end = math.ceil((index + 1) * self.settings.layer_length / TICK - 1e-6)
-        return (self.ticks < end) & (self.ticks != NEVER)
+        ticks = self._on_host("ticks")
+        return (ticks < end) & (ticks != NEVER)
 
     def layers(self, count: int | None = None) -> np.ndarray:
         """[L, J, I] bool, the time-layered occupancy grid.
@@ -282,6 +290,12 @@ class FutureModel:
     def body(self) -> Body:
         """The robot as the kernels read it."""
         return self._body
+
+    def _on_host(self, name: str) -> np.ndarray:
+        """One of the arrays, where NumPy reads it; brought there once."""
+        if name not in self._copies:
+            self._copies[name] = device.host(getattr(self, name))
+        return self._copies[name]
 
     def _checked_ticks(self, owner: str, times: object, count: int) -> np.ndarray:
         times = door.array(owner, "times", times, (None,))

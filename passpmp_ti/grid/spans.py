@@ -29,5 +29,5 @@ def spans_of(ticks: device.Array, counts: device.Array, size: int) -> device.Arr
     length = span_begins(size)[-1]
     pooled = device.empty((length,), np.uint32)
     spans = device.empty((length,), np.uint32)
-    lay_spans(ticks, counts, pooled, spans)
+    lay_spans(ticks, counts, device.share(), pooled, spans)
     return spans

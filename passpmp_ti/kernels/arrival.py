@@ -7,6 +7,7 @@ dist(p, static or unseen) <= clearance: DESIGN of the conservative model, Fig. 4
 import taichi as ti
 
 from passpmp_ti.kernels.beams import SLACK
+from passpmp_ti.kernels.spread import evens_first
 
 NEVER = 65535
 LATEST = 65534
@@ -14,80 +15,248 @@ TICK_SLACK = 0.05  # [ticks] f32 rounding of a time must never free a cell
 
 SAMPLING = 0.25  # [cells] between what may come out and the nearest mark
 
+LANES = 16
+"""Cells of a row that are worked on together; vectors of them become the CPU's own."""
+CHUNK = 8
+"""Rows that are passed over together where none of them is near enough to matter."""
+FAR = 1 << 14
+"""[cells] farther than any window is wide; its square and another's still fit an i32."""
+NO_SEED = 1e6
+"""[cells] where nothing is marked anywhere."""
+UNSEEN, SOURCE, SOURCE_LEFT, BLIND, BLIND_LEFT = range(5)
+KINDS = 5
+"""Of marks that distances are taken to."""
+
 Distances = ti.types.ndarray(dtype=ti.f32, ndim=2)  # [J, I] cells
 Arrival = ti.types.ndarray(dtype=ti.u16, ndim=2)  # [J, I] ticks
+Cells = ti.types.ndarray(dtype=ti.u8, ndim=2)  # [J, I]
+Marks = ti.types.ndarray(dtype=ti.u8, ndim=3)  # [5, J, I]: 0 marks
+vec = ti.types.vector(LANES, ti.i32)
 
 
 @ti.func
 def arrival_ticks(distance, speed, stamp_error):
     """Ticks until something that moves at `speed` has come `distance` nearer."""
-    ticks = NEVER
-    if speed > 0.0 or distance <= 0.0:
-        ticks = 0
-        if distance > 0.0:
-            exact = (distance / speed - stamp_error) * 1000.0 - TICK_SLACK
-            ticks = ti.cast(ti.floor(ti.min(ti.max(exact, 0.0), ti.cast(LATEST, ti.f32))), ti.i32)
-    return ticks
+    exact = (distance / ti.select(speed > 0.0, speed, 1.0) - stamp_error) * 1000.0 - TICK_SLACK
+    later = ti.cast(ti.floor(ti.min(ti.max(exact, 0.0), ti.cast(LATEST, ti.f32))), ti.i32)
+    return ti.select(distance > 0.0, ti.select(speed > 0.0, later, NEVER), 0)
 
 
 @ti.func
 def aged(ticks, age):
     """Remembered ticks, counted from the new base; what is never reached never will be."""
-    result = ticks
-    if ticks != NEVER:
-        result = ti.max(ticks - age, 0)
-    return result
+    return ti.select(ticks != NEVER, ti.max(ticks - age, 0), NEVER)
+
+
+@ti.func
+def unmarked(seen: ti.template(), marks: ti.template(), left: ti.template(), kind, j, i):
+    """[LANES] 0 where the row's cells from i on are marked."""
+    cells = vec(0)
+    if kind == UNSEEN:
+        for lane in ti.static(range(LANES)):
+            cells[lane] = ti.cast(seen[j, i + lane], ti.i32)
+    elif kind % 2 == 1:
+        for lane in ti.static(range(LANES)):
+            cells[lane] = ti.cast(marks[kind // BLIND, j, i + lane], ti.i32)
+    else:
+        for lane in ti.static(range(LANES)):
+            cells[lane] = ti.cast(left[kind // BLIND, j, i + lane], ti.i32)
+    return cells
+
+
+@ti.func
+def square_along_row(
+    seen: ti.template(),
+    marks: ti.template(),
+    left: ti.template(),
+    squares: ti.template(),
+    kind,
+    j,
+    blocks,
+    border,
+):
+    """Squared distance to the nearest mark of the same row, less the border of both cells."""
+    ramp = vec(0)
+    for lane in ti.static(range(LANES)):
+        ramp[lane] = lane + 1
+    away = FAR
+    row = (kind * seen.shape[0] + j) * blocks
+    for b in range(blocks):
+        cells = unmarked(seen, marks, left, kind, j, b * LANES)
+        steps = away + ramp
+        if cells.min() == 0:
+            for lane in ti.static(range(LANES)):
+                away = ti.select(cells[lane] == 0, 0, away + 1)
+                steps[lane] = away
+        away = ti.min(steps[LANES - 1], FAR)
+        squares[row + b] = ti.min(steps, FAR)
+    away = FAR
+    for back in range(blocks):
+        at = row + blocks - 1 - back
+        ahead = squares[at]
+        steps = away + (LANES + 1) - ramp
+        if ahead.min() == 0:
+            for back_lane in ti.static(range(LANES)):
+                lane = ti.static(LANES - 1 - back_lane)
+                away = ti.select(ahead[lane] == 0, 0, away + 1)
+                steps[lane] = away
+        away = ti.min(steps[0], FAR)
+        apart = ti.max(ti.min(steps, ahead) - border, 0)
+        squares[at] = apart * apart
+
+
+@ti.func
+def nearest(squares: ti.template(), least: ti.template(), kind: ti.template(), j, b, border, best):
+    """The least squared distances of a row's cells, no more than `best`: see `arrival_times`.
+
+    Rows are asked from the nearest on, and passed over by chunks that cannot matter any more.
+    """
+    blocks = least.shape[2]
+    worst = best.max()
+    going = worst > 0
+    step = 0
+    while going:
+        going = False
+        for way in ti.static(range(2)):
+            chunk = j // CHUNK + (2 * way - 1) * step
+            gap = chunk * CHUNK - j
+            if ti.static(way == 0):
+                gap = j - chunk * CHUNK - (CHUNK - 1)
+            gap = ti.max(gap - border, 0)
+            gap *= gap
+            if chunk >= 0 and chunk < least.shape[1] and (way == 0 or step > 0) and gap < worst:
+                going = True
+                if least[kind, chunk, b] + gap < worst:
+                    # unrolled: only then do lanes become the CPU's own vectors
+                    first = (kind * least.shape[1] + chunk) * CHUNK * blocks + b
+                    for row in ti.static(range(CHUNK)):
+                        apart = ti.max(ti.abs(chunk * CHUNK + row - j) - border, 0)
+                        best = ti.min(best, squares[first + row * blocks] + apart * apart)
+                    worst = best.max()
+        step += 1
+    return best
+
+
+@ti.func
+def row_of(ticks: ti.template(), j, i):
+    """[LANES] of a row from cell i on; 0 beyond the map."""
+    found = vec(0)
+    if i >= 0 and i + LANES <= ticks.shape[1]:
+        for lane in ti.static(range(LANES)):
+            found[lane] = ti.cast(ticks[j, i + lane], ti.i32)
+    else:
+        for lane in ti.static(range(LANES)):
+            if i + lane >= 0 and i + lane < ticks.shape[1]:
+                found[lane] = ti.cast(ticks[j, i + lane], ti.i32)
+    return found
+
+
+@ti.func
+def is_wanted(kind, opened, blind_speed):
+    """Whether there are marks of a kind to be asked about."""
+    return (kind < BLIND or blind_speed > 0.0) and (kind % 2 == 1 or kind == UNSEEN or opened == 1)
+
+
+@ti.func
+def way_to(square, border):
+    """[cells] from a squared distance."""
+    none = (FAR - border) * (FAR - border)
+    return ti.select(square >= none, NO_SEED, ti.sqrt(ti.cast(square, ti.f32)))
 
 
 @ti.kernel
 def arrival_times(
     # in
-    to_source: Distances,
-    to_blind: Distances,
-    to_unseen: Distances,
+    seen: Cells,
+    marks: Marks,  # from the sources on
+    left: Marks,  # the same, where only what objects of a size can come out of is left
     previous: Arrival,
     shift_i: ti.i32,  # cell [j, i] now was [j + shift_j, i + shift_i] before
     shift_j: ti.i32,
     age: ti.i32,  # ticks since the previous base; < 0: nothing is remembered
+    border: ti.i32,  # 1: between any points of two cells; 0: between their centres
+    unseen_square: ti.i32,  # squared distance [cells] to what is unseen of cells that are not free
+    opened: ti.i32,  # 1: what comes out must have come by both sets of marks
     cell: ti.f32,
     clearance: ti.f32,
     speed: ti.f32,
     blind_speed: ti.f32,
     stamp_error: ti.f32,
+    # scratch
+    squares: ti.types.ndarray(dtype=vec, ndim=1),  # [KINDS x J x I / LANES]
+    least: ti.types.ndarray(dtype=ti.i32, ndim=3),  # [KINDS, J / CHUNK, I / LANES]
     # out
     arrival: Arrival,
 ):
+    """Distances between cells, and what they make of the time of arrival.
+
+    Along each row, then over the rows; J is a multiple of CHUNK, I of LANES.
+    """
+    rows = arrival.shape[0]
+    blocks = arrival.shape[1] // LANES
+    chunks = rows // CHUNK
+    for task in range(KINDS * rows):
+        kind = task % KINDS
+        if is_wanted(kind, opened, blind_speed):
+            square_along_row(seen, marks, left, squares, kind, task // KINDS, blocks, border)
+    for task in range(KINDS * chunks * blocks):
+        kind = task // (chunks * blocks)
+        if is_wanted(kind, opened, blind_speed):
+            chunk = task // blocks % chunks
+            b = task % blocks
+            first = (kind * chunks + chunk) * CHUNK * blocks + b
+            low = squares[first]
+            for row in ti.static(range(1, CHUNK)):
+                low = ti.min(low, squares[first + row * blocks])
+            least[kind, chunk, b] = low.min()
+
     # Distances are between cells, any point of either. A source's samples are an eighth of a cell
     # apart, so where another view takes over, what comes out may do so an eighth of a cell from
     # the last mark, and another eighth is forgiven behind a standing surface.
-    rounding = 1e-3 * cell + SLACK
-    for j, i in arrival:
-        ticks = 0
-        if to_unseen[j, i] * cell - rounding > clearance:
-            taken = rounding + SAMPLING * cell + clearance
-            ticks = ti.min(
-                arrival_ticks(to_source[j, i] * cell - taken, speed, stamp_error),
-                arrival_ticks(to_blind[j, i] * cell - taken, blind_speed, stamp_error),
-            )
-        if age >= 0:
-            pi = i + shift_i
+    taken = 1e-3 * cell + SLACK + SAMPLING * cell + clearance
+    # down the columns: most of what one piece of work read is what the next one reads
+    for task in range(chunks * blocks):
+        b = evens_first(task // chunks, blocks)
+        for row in range(CHUNK):
+            j = task % chunks * CHUNK + row
+            most = vec(unseen_square + 1)
+            ticks = vec(0)
+            come = vec(0)
+            for kind in range(KINDS):
+                if most.max() > 0 and is_wanted(kind, opened, blind_speed):
+                    square = nearest(squares, least, kind, j, b, border, most)
+                    if kind == UNSEEN:
+                        free = square > unseen_square
+                        most = ti.select(free, FAR * FAR, 0)
+                        ticks = ti.select(free, NEVER, 0)
+                    else:
+                        pace = ti.select(kind < BLIND, speed, blind_speed)
+                        way = way_to(square, border) * cell - taken
+                        after = arrival_ticks(way, pace, stamp_error)
+                        # what comes out must have come by both sets of marks
+                        come = ti.max(come, after)
+                        if kind == SOURCE + opened or kind == BLIND + opened:
+                            ticks = ti.min(ticks, come)
+                            come = vec(0)
             pj = j + shift_j
-            if pi >= 0 and pj >= 0 and pi < previous.shape[1] and pj < previous.shape[0]:
-                remembered = aged(ti.cast(previous[pj, pi], ti.i32), age)
-                ticks = ti.max(ticks, remembered)
-        arrival[j, i] = ti.cast(ticks, ti.u16)
+            if age >= 0 and pj >= 0 and pj < previous.shape[0]:
+                remembered = row_of(previous, pj, b * LANES + shift_i)
+                ticks = ti.max(ticks, aged(remembered, age))
+            for lane in ti.static(range(LANES)):
+                arrival[j, b * LANES + lane] = ti.cast(ticks[lane], ti.u16)
 
 
 @ti.kernel
 def cap_memory(
     # in
     to_intruder: Distances,
+    previous: Arrival,
     cell: ti.f32,
     clearance: ti.f32,
     speed: ti.f32,
     stamp_error: ti.f32,
     age: ti.i32,
-    # in / out
+    # out
     remembered: Arrival,
 ):
     """Let memory promise nothing that the intruders seen now could break."""
@@ -97,7 +266,7 @@ def cap_memory(
         if ticks != NEVER:
             # counted from the old base, as the memory is
             ticks = ti.min(ticks + age, LATEST)
-        kept = ti.cast(remembered[j, i], ti.i32)
+        kept = ti.cast(previous[j, i], ti.i32)
         if distance <= 0.0:
             ticks = 0
         remembered[j, i] = ti.cast(ti.min(kept, ticks), ti.u16)

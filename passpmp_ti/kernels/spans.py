@@ -14,6 +14,8 @@ import taichi as ti
 LEVELS = 7
 BEGIN = 8
 """Where the levels' offsets begin in `counts`."""
+LINES = 64
+"""Rows of blocks that one thread is handed at a time."""
 TILE = 2 << (LEVELS - 1)
 ROUNDING = 3e-3
 """[m] by which sums of f32 ways may be short."""
@@ -61,11 +63,29 @@ def packed(least, greatest):
     return ti.cast(least, ti.u32) | (ti.cast(greatest, ti.u32) << ti.u32(16))
 
 
+@ti.func
+def column_of_three(pooled: ti.template(), begin, wide, rows, row, column):
+    """(least, greatest) of a block and those above and below; beyond the map nothing is free."""
+    least = 0
+    greatest = 0
+    if column < wide:
+        least = 65535
+        if row == 0 or row == rows - 1:
+            least = 0
+        for step in ti.static(range(-1, 2)):
+            j = ti.min(ti.max(row + step, 0), rows - 1)
+            both = pooled[begin + j * wide + column]
+            least = ti.min(least, ti.cast(both & ti.u32(65535), ti.i32))
+            greatest = ti.max(greatest, ti.cast(both >> ti.u32(16), ti.i32))
+    return ti.math.ivec2(least, greatest)
+
+
 @ti.kernel
 def lay_spans(
     # in
     arrival: ti.types.ndarray(dtype=ti.u16, ndim=2),  # [J, I]
     counts: Counts,
+    share: ti.i32,  # indices of a loop that one thread is handed at a time
     # scratch
     pooled: Spans,  # [F] the same without the neighbours
     # out
@@ -73,11 +93,14 @@ def lay_spans(
 ):
     # A tile holds whole blocks of every level, so one thread pools all of its levels.
     across = (counts[2] + TILE - 1) // TILE
-    for tile in range(across * ((counts[3] + TILE - 1) // TILE)):
+    for index in range(across * ((counts[3] + TILE - 1) // TILE) * share):
+        tile = index // share
         j0 = (tile // across) * TILE
         i0 = (tile % across) * TILE
         columns = blocks_along(counts[2], 0)
-        for row in range(j0 >> 1, ti.min((j0 + TILE) >> 1, blocks_along(counts[3], 0))):
+        # one of a tile's indices does all of its work
+        end = ti.select(index % share == 0, ti.min(j0 + TILE, counts[3]), j0)
+        for row in range(j0 >> 1, (end + 1) >> 1):
             for column in range(i0 >> 1, ti.min((i0 + TILE) >> 1, columns)):
                 least = 65535
                 greatest = 0
@@ -95,7 +118,7 @@ def lay_spans(
             below = blocks_along(counts[2], level - 1)
             below_rows = blocks_along(counts[3], level - 1)
             shift = level + 1
-            rows_end = ti.min((j0 + TILE) >> shift, blocks_along(counts[3], level))
+            rows_end = ti.select(end > j0, blocks_along(end, level), 0)
             columns_end = ti.min((i0 + TILE) >> shift, wide)
             for row in range(j0 >> shift, rows_end):
                 for column in range(i0 >> shift, columns_end):
@@ -115,25 +138,22 @@ def lay_spans(
     rows_of_all = 0
     for level in ti.static(range(LEVELS)):
         rows_of_all += blocks_along(counts[3], level)
-    for line in range(rows_of_all):
+    grain = (share + LINES - 1) // LINES
+    for index in range(rows_of_all * grain):
         level = 0
-        row = line
+        row = index // grain
         while row >= blocks_along(counts[3], level):
             row -= blocks_along(counts[3], level)
             level += 1
-        wide = blocks_along(counts[2], level)
+        wide = ti.select(index % grain == 0, blocks_along(counts[2], level), 0)
         rows = blocks_along(counts[3], level)
         begin = counts[BEGIN + level]
+        before = ti.math.ivec2(0, 0)
+        here = column_of_three(pooled, begin, wide, rows, row, 0)
         for column in range(wide):
-            least = 65535
-            greatest = 0
-            for dj in ti.static(range(-1, 2)):
-                for di in ti.static(range(-1, 2)):
-                    j = row + dj
-                    i = column + di
-                    both = ti.u32(0)
-                    if j >= 0 and i >= 0 and j < rows and i < wide:
-                        both = pooled[begin + j * wide + i]
-                    least = ti.min(least, ti.cast(both & ti.u32(65535), ti.i32))
-                    greatest = ti.max(greatest, ti.cast(both >> ti.u32(16), ti.i32))
+            after = column_of_three(pooled, begin, wide, rows, row, column + 1)
+            least = ti.min(before[0], here[0], after[0])
+            greatest = ti.max(before[1], here[1], after[1])
             spans[begin + row * wide + column] = packed(least, greatest)
+            before = here
+            here = after

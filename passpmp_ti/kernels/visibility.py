@@ -8,13 +8,18 @@ it touches as sources, except where some view shows that no mover can be.
 import taichi as ti
 
 from passpmp_ti.kernels.beams import MOVABLE, OPEN, SHUT, SLACK, STANDING, UNCOVERED, stays
+from passpmp_ti.kernels.spread import spread, spread_over
 
 TAU = 6.2831853
-BLOCK = 8  # cells along the side of a block that is first judged as a whole
+BLOCK, SMALLEST_BLOCK = 8, 4
+"""Cells along the side of blocks that are first judged as a whole."""
 BEARING_SLACK = 2e-5  # [rad] f32 bearings must not fall into the wrong wedge
 
 Views = ti.types.ndarray(dtype=ti.f32, ndim=2)
 Wedges = ti.types.ndarray(dtype=ti.i32, ndim=2)
+Rays = ti.types.ndarray(dtype=ti.f32, ndim=3)
+"""[V, n_max, 8] cosine and sine of a wedge's first bearing less what bearings may be off, of its
+last and as much, of its own beam, and of the next one."""
 Counts = ti.types.ndarray(dtype=ti.i32, ndim=1)
 Cells = ti.types.ndarray(dtype=ti.u8, ndim=2)
 
@@ -30,17 +35,13 @@ def wedge_at(view: ti.template(), n, v, bearing):
 
 
 @ti.func
-def wedges_across(view: ti.template(), n, v, x, y, pad):
-    """(first wedge, count) that a disc of radius `pad` about (x, y) spans, as view v sees it."""
-    dx = x - view[v, 0]
-    dy = y - view[v, 1]
-    r = ti.sqrt(dx * dx + dy * dy)
+def wedges_across(view: ti.template(), n, v, r, bearing, pad):
+    """(first wedge, count) that a disc of radius `pad` spans, r away as view v sees it."""
     first = 0
     count = n
     if 2.0 * pad < r:
         # asin(z) < 1.05 z up to z = 1/2: a wider span is a safer one
         half = 1.05 * pad / r + BEARING_SLACK
-        bearing = ti.atan2(dy, dx)
         first = wedge_at(view, n, v, bearing - half)
         last = wedge_at(view, n, v, bearing + half)
         count = last - first + 1
@@ -73,7 +74,23 @@ def way_out(c, s, dx, dy, half):
 
 
 @ti.func
-def proves_cell(view: ti.template(), n, reach: ti.template(), v, x, y, cell):
+def turn(view: ti.template(), beams: ti.template(), rays: ti.template(), v, w):
+    """Fill in the directions of wedge w of view v, see `Rays`."""
+    at = view[v, 2] + w * view[v, 3]
+    low = at - BEARING_SLACK
+    high = low + view[v, 3] + 2.0 * BEARING_SLACK
+    end = at + view[v, 3]
+    if w == beams[v] - 1:
+        high = view[v, 2] + TAU + BEARING_SLACK
+        end = view[v, 2]
+    bearings = ti.Vector([low, high, at, end])
+    for k in ti.static(range(4)):
+        rays[v, w, 2 * k] = ti.cos(bearings[k])
+        rays[v, w, 2 * k + 1] = ti.sin(bearings[k])
+
+
+@ti.func
+def proves_cell(view: ti.template(), n, reach: ti.template(), rays: ti.template(), v, x, y, cell):
     """Whether view v proves every point of the cell centred at (x, y) empty.
 
     Wedge by wedge: the farthest point of the cell in it must be within the wedge's reach. That
@@ -82,29 +99,30 @@ def proves_cell(view: ti.template(), n, reach: ti.template(), v, x, y, cell):
     half = 0.5 * cell
     dx = x - view[v, 0]
     dy = y - view[v, 1]
-    far = ti.sqrt((ti.abs(dx) + half) ** 2 + (ti.abs(dy) + half) ** 2) + SLACK
-    # the wedge of its centre touches it for sure: most cells that are not seen end here
     r = ti.sqrt(dx * dx + dy * dy)
-    ok = reach[v, wedge_at(view, n, v, ti.atan2(dy, dx))] >= r
+    ok = r <= view[v, 5]
     first, count = 0, 0
+    far = 0.0
     if ok:
-        first, count = wedges_across(view, n, v, x, y, 0.7071068 * cell)
+        # the wedge of its centre touches it for sure: most cells that are not seen end here
+        bearing = ti.atan2(dy, dx)
+        ok = reach[v, wedge_at(view, n, v, bearing)] >= r
+        if ok:
+            first, count = wedges_across(view, n, v, r, bearing, 0.7071068 * cell)
+            far = ti.sqrt((ti.abs(dx) + half) ** 2 + (ti.abs(dy) + half) ** 2) + SLACK
     k = 0
     while ok and k < count:
         w = first + k
         if w >= n:
             w -= n
         if reach[v, w] < far:
-            low = view[v, 2] + w * view[v, 3] - BEARING_SLACK
-            high = low + view[v, 3] + 2.0 * BEARING_SLACK
             if w == n - 1:
-                high = view[v, 2] + TAU + BEARING_SLACK
                 # what lies between two rays is told by their sides: for less than half a turn
                 ok = view[v, 4] < 3.0
-            cl = ti.cos(low)
-            sl = ti.sin(low)
-            ch = ti.cos(high)
-            sh = ti.sin(high)
+            cl = rays[v, w, 0]
+            sl = rays[v, w, 1]
+            ch = rays[v, w, 2]
+            sh = rays[v, w, 3]
             farthest = ti.max(way_out(cl, sl, dx, dy, half), way_out(ch, sh, dx, dy, half))
             for corner in ti.static(range(4)):
                 px = dx + half * (2 * (corner % 2) - 1)
@@ -119,27 +137,35 @@ def proves_cell(view: ti.template(), n, reach: ti.template(), v, x, y, cell):
 
 
 @ti.func
-def before_wall(view: ti.template(), n, ranges: ti.template(), v, w, x, y, tolerance, cell):
+def before_wall(
+    view: ti.template(),
+    n,
+    ranges: ti.template(),
+    rays: ti.template(),
+    v,
+    w,
+    x,
+    y,
+    tolerance,
+    cell,
+):
     """Whether (x, y) is on the sensor's side of the surface that shuts wedge w of view v.
 
     The surface is known as the chord between two returns. Its true course may lie behind the
     chord, in a corner, by half the chord's length; an eighth of a cell of that is forgiven, and
     charged in kernels/arrival.py.
     """
-    a = view[v, 2] + w * view[v, 3]
-    b = a + view[v, 3]
     last = w + 1
     if w == n - 1:
-        b = view[v, 2]
         last = 0
     ra = ranges[v, w]
     rb = ranges[v, last]
     result = False
     if ra > 0.0 and rb > 0.0:
-        ax = ra * ti.cos(a)
-        ay = ra * ti.sin(a)
-        bx = rb * ti.cos(b) - ax
-        by = rb * ti.sin(b) - ay
+        ax = ra * rays[v, w, 4]
+        ay = ra * rays[v, w, 5]
+        bx = rb * rays[v, w, 6] - ax
+        by = rb * rays[v, w, 7] - ay
         px = x - view[v, 0] - ax
         py = y - view[v, 1] - ay
         length = ti.sqrt(bx * bx + by * by)
@@ -156,6 +182,7 @@ def keeps_out(
     ranges: ti.template(),
     reach: ti.template(),
     far_side: ti.template(),
+    rays: ti.template(),
     v,
     x,
     y,
@@ -183,7 +210,7 @@ def keeps_out(
             w = wedge_at(view, n, v, bearing + (2 * half - 1) * BEARING_SLACK)
             kept = reach[v, w] >= r + 2.0 * SLACK
             if not kept and far_side[v, w] == SHUT:
-                kept = before_wall(view, n, ranges, v, w, x, y, tolerance, cell)
+                kept = before_wall(view, n, ranges, rays, v, w, x, y, tolerance, cell)
     return kept
 
 
@@ -196,7 +223,8 @@ def block_seen(view: ti.template(), beams: ti.template(), reach: ti.template(), 
         dy = y - view[v, 1]
         r = ti.sqrt(dx * dx + dy * dy)
         if verdict != 1 and r - radius <= view[v, 5]:
-            first, count = wedges_across(view, beams[v], v, x, y, radius)
+            bearing = ti.atan2(dy, dx)
+            first, count = wedges_across(view, beams[v], v, r, bearing, radius)
             least = view[v, 5]
             most = 0.0
             for k in range(count):
@@ -212,36 +240,46 @@ def block_seen(view: ti.template(), beams: ti.template(), reach: ti.template(), 
     return verdict
 
 
-@ti.kernel
-def see_cells(
-    # in
-    view: Views,  # [V, 8]
-    beams: Counts,  # [V]
-    reach: Views,  # [V, n_max]
-    corner_i: ti.i32,
-    corner_j: ti.i32,
-    cell: ti.f32,
-    # out
-    seen: Cells,  # [J, I], J and I multiples of BLOCK: 1 = all of the cell proven empty
+@ti.func
+def see_block(
+    view: ti.template(),
+    beams: ti.template(),
+    reach: ti.template(),
+    rays: ti.template(),
+    seen: ti.template(),
+    i0,
+    j0,
+    corner_i,
+    corner_j,
+    cell,
+    side: ti.template(),
 ):
-    columns = seen.shape[1] // BLOCK
-    for block in range((seen.shape[0] // BLOCK) * columns):
-        j0 = (block // columns) * BLOCK
-        i0 = (block % columns) * BLOCK
-        x0 = (corner_i + i0 + 0.5 * BLOCK) * cell
-        y0 = (corner_j + j0 + 0.5 * BLOCK) * cell
-        radius = 0.7071068 * BLOCK * cell + SLACK
-        verdict = block_seen(view, beams, reach, x0, y0, radius)
-        for dj in range(BLOCK):
-            for di in range(BLOCK):
-                empty = verdict == 1
-                if verdict < 0:
+    """Write 1 for what is seen of a block of `side` x `side` cells; its quarters are judged as a
+    whole first, then their cells."""
+    x0 = (corner_i + i0 + 0.5 * side) * cell
+    y0 = (corner_j + j0 + 0.5 * side) * cell
+    verdict = block_seen(view, beams, reach, x0, y0, 0.7071068 * side * cell + SLACK)
+    if verdict > 0:
+        for dj in range(side):
+            for di in range(side):
+                seen[j0 + dj, i0 + di] = ti.u8(1)
+    elif verdict < 0:
+        if ti.static(side > SMALLEST_BLOCK):
+            for quarter in range(4):
+                i = i0 + quarter % 2 * (side // 2)
+                j = j0 + quarter // 2 * (side // 2)
+                see_block(view, beams, reach, rays, seen, i, j, corner_i, corner_j, cell, side // 2)
+        else:
+            for dj in range(side):
+                for di in range(side):
                     x = (corner_i + i0 + di + 0.5) * cell
                     y = (corner_j + j0 + dj + 0.5) * cell
+                    empty = False
                     for v in range(view.shape[0]):
                         if not empty:
-                            empty = proves_cell(view, beams[v], reach, v, x, y, cell)
-                seen[j0 + dj, i0 + di] = ti.cast(empty, ti.u8)
+                            empty = proves_cell(view, beams[v], reach, rays, v, x, y, cell)
+                    if empty:
+                        seen[j0 + dj, i0 + di] = ti.u8(1)
 
 
 @ti.func
@@ -264,6 +302,7 @@ def mark_piece(
     ranges: ti.template(),
     reach: ti.template(),
     far_side: ti.template(),
+    rays: ti.template(),
     marks: ti.template(),
     v,
     scans,
@@ -280,23 +319,34 @@ def mark_piece(
 ):
     """Walk a border piece from (r, bearing), `outwards` metres and `across` radians, and mark the
     cells that hold its samples, except where a view keeps movers out."""
+    apart = blind_apart == 1 and (side == UNCOVERED or v >= scans)
+    c = ti.cos(bearing)
+    s = ti.sin(bearing)
     pieces = ti.cast((outwards + r * across) / (0.125 * cell), ti.i32) + 1
     for k in range(pieces + 1):
         at_r = r + outwards * k / pieces
-        at_bearing = bearing + across * k / pieces
-        x = view[v, 0] + at_r * ti.cos(at_bearing)
-        y = view[v, 1] + at_r * ti.sin(at_bearing)
-        inside = False
-        for w in range(view.shape[0]):
-            if not inside:
-                inside = keeps_out(
-                    view, beams[w], ranges, reach, far_side, w, x, y, tolerance, cell
-                )
+        if across > 0.0:
+            at_bearing = bearing + across * k / pieces
+            c = ti.cos(at_bearing)
+            s = ti.sin(at_bearing)
+        x = view[v, 0] + at_r * c
+        y = view[v, 1] + at_r * s
         i = ti.cast(ti.floor(x / cell), ti.i32) - corner_i
         j = ti.cast(ti.floor(y / cell), ti.i32) - corner_j
-        if not inside and i >= 0 and j >= 0 and i < marks.shape[2] and j < marks.shape[1]:
-            apart = side == UNCOVERED or v >= scans
-            if apart and blind_apart == 1 and not covered(view, beams, scans, x, y):
+        open_ = i >= 0 and j >= 0 and i < marks.shape[2] and j < marks.shape[1]
+        if open_ and not apart:
+            # most samples have one in the same cell before them that said all that they could say
+            open_ = marks[SOURCES, j, i] != 0
+            if side == STANDING and marks[STANDING_SOURCES, j, i] != 0:
+                open_ = True
+        w = 0
+        while open_ and w < view.shape[0]:
+            open_ = not keeps_out(
+                view, beams[w], ranges, reach, far_side, rays, w, x, y, tolerance, cell
+            )
+            w += 1
+        if open_:
+            if apart and not covered(view, beams, scans, x, y):
                 marks[BLIND_SOURCES, j, i] = ti.u8(0)
             else:
                 marks[SOURCES, j, i] = ti.u8(0)
@@ -316,7 +366,7 @@ def lets_through(side, other):
 
 
 @ti.kernel
-def mark_sources(
+def rasterise(
     # in
     view: Views,  # [V, 8]
     beams: Counts,  # [V]
@@ -330,14 +380,31 @@ def mark_sources(
     corner_j: ti.i32,
     cell: ti.f32,
     tolerance: ti.f32,  # by how much two views of one surface may differ [m]
-    # out
-    marks: ti.types.ndarray(dtype=ti.u8, ndim=3),  # [5, J, I]: 0 marks
+    # scratch
+    rays: Rays,
+    # in / out
+    seen: Cells,  # [J, I] of 0; 1 where all of the cell is proven empty; multiples of BLOCK
+    marks: ti.types.ndarray(dtype=ti.u8, ndim=3),  # [5, J, I] of 1; 0 marks
 ):
+    """What the views prove empty, and where something may come out of the rest."""
     n_max = reach.shape[1]
     for task in range(view.shape[0] * n_max):
-        v = task // n_max
-        beam = task % n_max
-        n = beams[v]
+        if task % n_max < beams[task // n_max]:
+            turn(view, beams, rays, task // n_max, task % n_max)
+
+    columns = seen.shape[1] // BLOCK
+    for block in range((seen.shape[0] // BLOCK) * columns):
+        i0 = block % columns * BLOCK
+        j0 = block // columns * BLOCK
+        see_block(view, beams, reach, rays, seen, i0, j0, corner_i, corner_j, cell, BLOCK)
+
+    for task in range(spread_over(view.shape[0] * n_max)):
+        piece_of = spread(task, view.shape[0] * n_max)
+        v = piece_of // n_max
+        beam = piece_of % n_max
+        n = 0
+        if v < view.shape[0]:
+            n = beams[v]
         if beam < n:
             bearing = view[v, 2] + beam * view[v, 3]
             angle = view[v, 3]
@@ -373,6 +440,7 @@ def mark_sources(
                         ranges,
                         reach,
                         far_side,
+                        rays,
                         marks,
                         v,
                         scans,

@@ -76,6 +76,7 @@ def vanished(before: FutureModel, now: FutureModel, *, timeless: bool = False) -
     margin = 2 * (settings.range_noise + settings.localisation_error) + 2 * now.cell
     asked = 0
     squares = []
+    seen = now.seen
     shift = now.window.cells_to(before.window)
     for mask, speed in ((before.static, 0.0), (before.movable, settings.object_speed)):
         reach = math.ceil((speed * age + margin) / now.cell) + 1
@@ -87,11 +88,11 @@ def vanished(before: FutureModel, now: FutureModel, *, timeless: bool = False) -
         inside = (np.minimum(i, j) >= reach) & (np.maximum(i, j) < size - reach)
         i, j = i[inside], j[inside]
         asked += len(i)
-        passed = now.seen[j, i]  # most are not: that is quick to ask
+        passed = seen[j, i]  # most are not: that is quick to ask
         if passed.any():
             j, i = j[passed], i[passed]
             squares.append(np.stack([j, i, np.full(len(i), reach)], axis=1))
-    gone = _empty(now.seen, np.concatenate(squares)) if squares else 0
+    gone = _empty(seen, np.concatenate(squares)) if squares else 0
     if gone >= FEWEST and gone >= LEAST_SHARE * asked:
         return f"{gone} of {asked} surfaces are gone that cannot be"
     return ""

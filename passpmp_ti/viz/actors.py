@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from passpmp_ti import device
 from passpmp_ti.robots import Robot
 from passpmp_ti.viz import palette
 from passpmp_ti.viz.plot import Plot
@@ -23,7 +24,7 @@ LEAST_ROBOT, LARGE_ROBOT = 5.0, 14.0
 
 def shade_unseen(model: FutureModel, plot: Plot) -> None:
     """Hatch what the scan did not see and memory does not know to be free."""
-    known = model.seen | (model.ticks > model.ticks_of(model.stamp))
+    known = model.seen | (device.host(model.ticks) > model.ticks_of(model.stamp))
     plot.shade(~plot.sampled(known, model.origin, model.cell))
 
 
