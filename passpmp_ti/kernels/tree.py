@@ -28,6 +28,9 @@ from passpmp_ti.kernels.check import (
 from passpmp_ti.kernels.guide import guide_at
 from passpmp_ti.kernels.motion import (
     CAR,
+    THETA,
+    A,
+    B,
     C,
     S,
     X,
@@ -40,6 +43,7 @@ from passpmp_ti.kernels.motion import (
     speed_of,
     step,
 )
+from passpmp_ti.kernels.roads import placed, proving_road, road_clear
 from passpmp_ti.kernels.spans import Spans
 
 GROWN, BRAKED = 0, 1
@@ -173,6 +177,46 @@ def driven_clear(
 
 
 @ti.func
+def road_cost(
+    guide: ti.template(),
+    ahead: ti.template(),
+    guide_frame: ti.template(),
+    numbers: ti.template(),
+    roads: ti.template(),
+    rows: ti.template(),
+    road,
+    steps,
+    samples: ti.template(),
+    start,
+    here,
+):
+    """(integral of the guide along the first `steps` of a road from `start`, guide at its end)."""
+    before = here
+    spent = 0.0
+    done = 0
+    for n in ti.static(range(samples)):
+        at = steps * (n + 1) // samples
+        if at > done:
+            q = placed(rows, roads[road, 0] + at, start[X], start[Y], start[C], start[S])
+            after = cost_at(guide, ahead, guide_frame, q)
+            spent += 0.5 * (before + after) * (at - done) * numbers[1]
+            before = after
+            done = at
+    return spent, before
+
+
+@ti.func
+def road_end(rows: ti.template(), roads: ti.template(), road, steps, start):
+    """The pose at the end of a primitive's road."""
+    q = placed(rows, roads[road, 0] + steps, start[X], start[Y], start[C], start[S])
+    row = roads[road, 2]
+    q[THETA] = start[THETA] + rows[row, 0]
+    q[A] = rows[row, 1]
+    q[B] = rows[row, 2]
+    return q
+
+
+@ti.func
 def block_begin(b, blocks, first, last):
     """First parent of a block."""
     return first + ti.cast(ti.cast(b, ti.i64) * (last - first) // blocks, ti.i32)
@@ -199,6 +243,7 @@ def room_for(
 def grow_level(
     # in
     kind: ti.template(),
+    by_roads: ti.template(),  # whether `roads` hold the ways of the parents' gaits
     share: ti.template(),  # indices that one thread is handed at a time, see device.share
     grain: ti.template(),  # children that one thread checks in one go
     arrival: Arrival,  # [J, I]
@@ -214,10 +259,14 @@ def grow_level(
     last: ti.i32,
     slot: ti.i32,  # nodes in the tree so far
     steps: ti.i32,
+    roads: Links,  # [P, 5]
+    rows: Table,  # [R, 4]
+    number: ti.i32,  # of gaits
     # in / out
     pose: Table,
     link: Links,
     cost: Table,
+    gait: Counts,  # [cap], of parents and children where `by_roads`
     # scratch
     child: Table,  # [M, 9] pose, integral of the guide, guide at the end
     child_proof: Counts,  # [M]: 1 + braking control, 0: not safe
@@ -235,7 +284,22 @@ def grow_level(
             for m in range(begin, ti.min(begin + grain, children)):
                 parent = first + m // per_parent
                 proof = 0
-                if link[parent, WHAT] == GROWN:
+                if ti.static(by_roads):
+                    if link[parent, WHAT] == GROWN:
+                        tick = link[parent, TICK]
+                        road = gait[parent] * per_parent + m % per_parent
+                        x, y = pose[parent, X], pose[parent, Y]
+                        c, s = pose[parent, C], pose[parent, S]
+                        if road_clear(
+                            arrival, spans, numbers, counts, roads, rows, road, x, y, c, s, tick
+                        ):
+                            q = placed(rows, roads[road, 0] + steps, x, y, c, s)
+                            proof = proving_road(
+                                arrival, spans, numbers, counts, roads, rows,
+                                number * per_parent + roads[road, 4] * counts[6],
+                                q[X], q[Y], q[C], q[S], tick + steps * counts[4],
+                            )  # fmt: skip
+                elif link[parent, WHAT] == GROWN:
                     robot = robot_of(numbers)
                     tick = link[parent, TICK]
                     clear, q, spent, there = driven_clear(
@@ -310,8 +374,33 @@ def grow_level(
                     for k in range(per_parent):
                         m = (parent - first) * per_parent + k
                         if child_proof[m] > 0:
-                            q = pose_of(child, m)
-                            there = child[m, 8]
+                            q = pose7(0.0)
+                            spent, there, after, end, seconds = 0.0, 0.0, 0.0, 0.0, 0.0
+                            if ti.static(by_roads):
+                                road = gait[parent] * per_parent + k
+                                start = pose_of(pose, parent)
+                                q = road_end(rows, roads, road, steps, start)
+                                spent, there = road_cost(
+                                    guide, ahead, guide_frame, numbers, roads, rows, road, steps,
+                                    SAMPLES, start, cost[parent, 1],
+                                )  # fmt: skip
+                                spent += cost[parent, 0]
+                                gait[at] = roads[road, 4]
+                                brake = number * per_parent + roads[road, 4] * counts[6]
+                                brake += child_proof[m] - 1
+                                seconds = roads[brake, 1] * numbers[1]
+                                after, end = road_cost(
+                                    guide, ahead, guide_frame, numbers, roads, rows, brake,
+                                    roads[brake, 1], BRAKING_SAMPLES, q, there,
+                                )  # fmt: skip
+                            else:
+                                q = pose_of(child, m)
+                                spent = child[m, 7]
+                                there = child[m, 8]
+                                after, end, seconds = braking_cost(
+                                    kind, guide, ahead, guide_frame, numbers, robot_of(numbers), q,
+                                    there, control_of(braking, child_proof[m] - 1),
+                                )  # fmt: skip
                             store_pose(pose, at, q)
                             link[at, PARENT] = parent
                             link[at, CONTROL] = k
@@ -321,14 +410,10 @@ def grow_level(
                             link[at, FIRST] = -1
                             link[at, CHILDREN] = 0
                             link[at, WHAT] = GROWN
-                            spent, end_cost, seconds = braking_cost(
-                                kind, guide, ahead, guide_frame, numbers, robot_of(numbers), q,
-                                there, control_of(braking, child_proof[m] - 1),
-                            )  # fmt: skip
-                            cost[at, 0] = child[m, 7]
+                            cost[at, 0] = spent
                             cost[at, 1] = there
-                            cost[at, 2] = spent
-                            cost[at, 3] = end_cost
+                            cost[at, 2] = after
+                            cost[at, 3] = end
                             cost[at, 4] = seconds
                             at += 1
                 elif fits:

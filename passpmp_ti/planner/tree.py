@@ -11,6 +11,7 @@ from passpmp_ti import device
 from passpmp_ti.grid.body import to_poses, to_states
 from passpmp_ti.grid.model import TICK, FutureModel
 from passpmp_ti.kernels.check import trace
+from passpmp_ti.kernels.roads import lay_roads, sort_gaits
 from passpmp_ti.kernels.tree import (
     BRAKED,
     CHILDREN,
@@ -42,6 +43,10 @@ DEVICE_CHUNK, DEVICE_BLOCKS = 1 << 20, 1024
 FILLED = 0.5
 """Share of the memory that a tree may fill: the rest is for the model, the swarm and others."""
 DEEPEST = 64
+import os
+GAITS = 1024
+ROWS = 1 << 20
+RATIO = float(os.environ.get("RATIO", 4))
 """Levels that a plan is read back from."""
 
 
@@ -227,6 +232,13 @@ class TreeGrower:
         self._child_proof = device.empty((self._chunk * fan,), np.int32)
         self._block = device.empty((self._blocks + 1,), np.int32)
         self._grown = device.empty((2,), np.int32)
+        self._gait = device.empty((settings.capacity,), np.int32)
+        self._gaits = device.empty((GAITS, 2), np.float32)
+        self._ends = device.empty((GAITS, 2), np.float32)
+        self._slots = device.empty((4 * GAITS,), np.int32)
+        self._roads = device.empty((GAITS * (fan + len(robot.braking)), 5), np.int32)
+        self._rows = device.empty((ROWS, 4), np.float32)
+        self._laid = device.empty((1,), np.int32)
 
     def grow(
         self, model: FutureModel, guide: GuideField, root: np.ndarray, start: float, proof: int,
@@ -262,8 +274,11 @@ class TreeGrower:
         )  # fmt: skip
         level_begin, count, depth, stopped_by = ROOT, 1, 0, "depth"
         pace = 0.0
+        number = 0
         for steps in settings.levels:
             first, level_end, short = level_begin, count, 0
+            by_roads, number = self._prepare(body, model.counts, arrays[0], first, level_end, number, steps)
+            ending = int(device.host(self._laid)[0]) if by_roads else 0
             while first < level_end and not short:
                 now = time.perf_counter()
                 parents = min(self._chunk, level_end - first)
@@ -273,12 +288,16 @@ class TreeGrower:
                         stopped_by = "time"
                         break
                 grow_level(
-                    *fixed, first, first + parents, count, steps, *arrays,
+                    body.kind, by_roads, *fixed[1:], first, first + parents, count, steps,
+                    self._roads, self._rows, number, *arrays, self._gait,
                     self._child, self._child_proof, self._block, self._grown,
                 )  # fmt: skip
                 count, short = (int(n) for n in device.host(self._grown))
                 first += parents
                 pace = max(0.5 * pace, (time.perf_counter() - now) / parents)
+            number = ending
+            if by_roads:
+                self._gaits, self._ends = self._ends, self._gaits
             depth += count > level_end
             if short:
                 stopped_by = "capacity"
@@ -290,6 +309,24 @@ class TreeGrower:
         if not device.resident():
             arrays = tuple(array[:count] for array in arrays)
         return Tree(model, *arrays, root_pose, count, start, depth, stopped_by)
+
+
+    def _prepare(self, body, counts, pose, first, last, number, steps):
+        if number == 0:
+            if last - first < 32 or last - first > 4096:
+                return False, 0
+            number = sort_gaits(
+                body.kind, body.numbers, pose, first, last, self._slots, self._gait, self._gaits
+            )
+        if number <= 0 or number * RATIO > last - first:
+            return False, 0
+        lay_roads(
+            body.kind, body.numbers, counts, body.braking, body.controls, self._gaits, number,
+            steps, self._slots, self._roads, self._rows, self._ends, self._laid,
+        )
+        if int(device.host(self._laid)[0]) < 0:
+            return False, 0
+        return True, number
 
 
 def _in_time(parents: int, left: float, pace: float) -> int:
