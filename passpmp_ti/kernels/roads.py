@@ -21,7 +21,6 @@ import taichi as ti
 
 from passpmp_ti.kernels.check import (
     LATEST,
-    Arrival,
     Counts,
     Numbers,
     Table,
@@ -31,11 +30,11 @@ from passpmp_ti.kernels.check import (
 )
 from passpmp_ti.kernels.motion import (
     CAR,
+    THETA,
     A,
     B,
     C,
     S,
-    THETA,
     X,
     Y,
     at_rest,
@@ -47,10 +46,10 @@ from passpmp_ti.kernels.motion import (
 )
 from passpmp_ti.kernels.spans import LEVELS, level_for, span_about
 
-FINEST = 2
+FINEST = 4
 """Time steps of the shortest sections."""
 DOOMS = 3
-SAME = 1e-6
+SAME = 5e-7
 """Speeds and angles that differ by less than this share of the greatest are taken for one."""
 
 Links = ti.types.ndarray(dtype=ti.i32, ndim=2)
@@ -259,7 +258,7 @@ def lay_roads(
     for p in range(ways):
         begin = p * rows_for(steps)
         sections = begin + steps + 1
-        if sections < rows.shape[0] - rows_for(steps):
+        if begin + rows_for(steps) <= rows.shape[0]:
             robot = robot_of(numbers)
             g = p // counts[7]
             control = control_of(controls, p % counts[7])
@@ -321,7 +320,7 @@ def lay_roads(
         if not fits:
             laid[0] = -1
 
-    for gait in range(laid[0]):
+    for gait in range(ti.max(laid[0], 0)):
         robot = robot_of(numbers)
         for b in range(counts[6]):
             road = ways + gait * counts[6] + b

@@ -39,6 +39,8 @@ from passpmp_ti.kernels.motion import (
     braking_steps,
     heading_for,
     pose7,
+    seen_from,
+    setting_off,
     setting_out,
     speed_of,
     step,
@@ -50,6 +52,7 @@ GROWN, BRAKED = 0, 1
 """What a node is: the end of a primitive, or the rest that a braking trajectory leads to."""
 
 PARENT, CONTROL, STEPS, TICK, PROOF, FIRST, CHILDREN, WHAT = range(8)
+FEW = 256  # parents that are given their slots in one go
 SAMPLES = 2  # of the guide along a primitive, after its beginning
 BRAKING_SAMPLES = 4  # the same along a braking
 
@@ -130,7 +133,7 @@ def driven_clear(
 ):
     """(whether a primitive from `start` touches nothing, its end, integral of the guide along it,
     guide at its end). Waiting is not checked, leaving is."""
-    q = start
+    q = setting_off(start)
     tick = start_tick
     direction = heading_for(kind, q)
     towards = setting_out(kind, q, control)
@@ -153,8 +156,9 @@ def driven_clear(
             fastest = speed_of(kind, q) + gain * left * numbers[1]
             # as a braking it would cover half of the way that it covers at one speed
             free, level = free_steps(
-                spans, numbers, counts, q, ti.min(fastest, robot[0]), towards, tick, 2 * left, level
-            )
+                spans, numbers, counts, seen_from(start, q), ti.min(fastest, robot[0]), towards,
+                tick, 2 * left, level,
+            )  # fmt: skip
         before = q
         q = step(kind, robot, q, control, direction, numbers[1])
         if free > 0:
@@ -162,18 +166,20 @@ def driven_clear(
         else:
             still = at_rest(kind, q)
             if not (resting and still):
-                clear = way_clear(arrival, numbers, counts, before, q, tick)
+                clear = way_clear(
+                    arrival, numbers, counts, seen_from(start, before), seen_from(start, q), tick
+                )
             free += 1
         resting = at_rest(kind, q)
         tick += counts[4]
         k += 1
         since += 1
         if since == pace or k == steps:
-            after = cost_at(guide, ahead, guide_frame, q)
+            after = cost_at(guide, ahead, guide_frame, seen_from(start, q))
             spent += 0.5 * (before_cost + after) * since * numbers[1]
             before_cost = after
             since = 0
-    return clear, q, spent, before_cost
+    return clear, seen_from(start, q), spent, before_cost
 
 
 @ti.func
@@ -208,8 +214,8 @@ def road_cost(
 @ti.func
 def road_end(rows: ti.template(), roads: ti.template(), road, steps, start):
     """The pose at the end of a primitive's road."""
-    q = placed(rows, roads[road, 0] + steps, start[X], start[Y], start[C], start[S])
     row = roads[road, 2]
+    q = placed(rows, roads[road, 0] + steps, start[X], start[Y], start[C], start[S])
     q[THETA] = start[THETA] + rows[row, 0]
     q[A] = rows[row, 1]
     q[B] = rows[row, 2]
@@ -259,9 +265,9 @@ def grow_level(
     last: ti.i32,
     slot: ti.i32,  # nodes in the tree so far
     steps: ti.i32,
+    number: ti.i32,  # of the parents' gaits
     roads: Links,  # [P, 5]
     rows: Table,  # [R, 4]
-    number: ti.i32,  # of gaits
     # in / out
     pose: Table,
     link: Links,
@@ -276,7 +282,7 @@ def grow_level(
 ):
     per_parent = counts[7]
     capacity = pose.shape[0]
-    blocks = block.shape[0] - 1
+    blocks = ti.min(block.shape[0] - 1, 1 + (last - first) // FEW)
     children = (last - first) * per_parent
     for index in range((children + grain - 1) // grain * share):
         if index % share == 0:
@@ -443,11 +449,12 @@ def store_braking(
     start = pose_of(pose, parent)
     control = control_of(braking, link[parent, PROOF])
     robot = robot_of(numbers)
-    q = start
+    q = setting_off(start)
     taken = 0
     while not at_rest(kind, q):
         q = step(kind, robot, q, control, 0.0, numbers[1])
         taken += 1
+    q = seen_from(start, q)
     store_pose(pose, at, q)
     spent, _, _ = braking_cost(
         kind, guide, ahead, guide_frame, numbers, robot, start, cost[parent, 1], control

@@ -11,7 +11,6 @@ from passpmp_ti import device
 from passpmp_ti.grid.body import to_poses, to_states
 from passpmp_ti.grid.model import TICK, FutureModel
 from passpmp_ti.kernels.check import trace
-from passpmp_ti.kernels.roads import lay_roads, sort_gaits
 from passpmp_ti.kernels.tree import (
     BRAKED,
     CHILDREN,
@@ -26,6 +25,7 @@ from passpmp_ti.kernels.tree import (
 )
 from passpmp_ti.kernels.tree import TICK as TICK_COLUMN
 from passpmp_ti.planner.guide import GuideField
+from passpmp_ti.planner.roads import Roads
 from passpmp_ti.robots import Robot
 from passpmp_ti.settings import Settings
 
@@ -35,18 +35,16 @@ NO_PARENT = -1
 
 CHUNK = 1 << 16
 """Most children that are checked in one launch: what is kept of them fits the processor's cache."""
-GRAIN, BLOCKS = 16, 16
-"""Children that a thread of a CPU checks in one go, and blocks of parents that are given their
-slots side by side."""
+GRAIN, ROADS_GRAIN, BLOCKS = 16, device.SHARE, 16
+"""Children that a thread of a CPU checks in one go, the same along roads, and blocks of parents
+that are given their slots side by side."""
+LEAST = 256
+"""Parents of a chunk that is no larger than what room is left for: a launch costs as much."""
 DEVICE_CHUNK, DEVICE_BLOCKS = 1 << 20, 1024
 """The same on a device, where each thread checks one child."""
 FILLED = 0.5
 """Share of the memory that a tree may fill: the rest is for the model, the swarm and others."""
 DEEPEST = 64
-import os
-GAITS = 1024
-ROWS = 1 << 20
-RATIO = float(os.environ.get("RATIO", 4))
 """Levels that a plan is read back from."""
 
 
@@ -202,8 +200,8 @@ def follow(model: FutureModel, pose: np.ndarray, parts: list[tuple[np.ndarray, i
 
 
 def tree_bytes(capacity: int) -> int:
-    """What a tree of `capacity` nodes takes [bytes]."""
-    return capacity * 4 * (7 + 8 + 5)
+    """What a tree of `capacity` nodes takes, and the gaits of its nodes [bytes]."""
+    return capacity * 4 * (7 + 8 + 5 + 1)
 
 
 class TreeGrower:
@@ -227,18 +225,12 @@ class TreeGrower:
         resident = device.resident()
         self._chunk = max(1, min(settings.capacity, (DEVICE_CHUNK if resident else CHUNK) // fan))
         self._blocks = DEVICE_BLOCKS if resident else BLOCKS
-        self._grain = 1 if resident else GRAIN
+        self._grains = (1, 1) if resident else (GRAIN, ROADS_GRAIN)
         self._child = device.empty((self._chunk * fan, 9), np.float32)
         self._child_proof = device.empty((self._chunk * fan,), np.int32)
         self._block = device.empty((self._blocks + 1,), np.int32)
         self._grown = device.empty((2,), np.int32)
-        self._gait = device.empty((settings.capacity,), np.int32)
-        self._gaits = device.empty((GAITS, 2), np.float32)
-        self._ends = device.empty((GAITS, 2), np.float32)
-        self._slots = device.empty((4 * GAITS,), np.int32)
-        self._roads = device.empty((GAITS * (fan + len(robot.braking)), 5), np.int32)
-        self._rows = device.empty((ROWS, 4), np.float32)
-        self._laid = device.empty((1,), np.int32)
+        self._roads = Roads(robot, settings.capacity)
 
     def grow(
         self, model: FutureModel, guide: GuideField, root: np.ndarray, start: float, proof: int,
@@ -269,35 +261,36 @@ class TreeGrower:
             np.array([0.0, here, 0.0, here, 0.0], dtype=np.float32),
         )
         fixed = (
-            body.kind, device.share(), self._grain, model.ticks, model.spans, guide.time,
-            guide.ahead, guide.frame, body.numbers, model.counts, body.braking, body.controls,
+            model.ticks, model.spans, guide.time, guide.ahead, guide.frame, body.numbers,
+            model.counts, body.braking, body.controls,
         )  # fmt: skip
+        roads = self._roads
+        roads.clear()
         level_begin, count, depth, stopped_by = ROOT, 1, 0, "depth"
-        pace = 0.0
-        number = 0
+        pace, fan = 0.0, float(len(body.controls))
         for steps in settings.levels:
             first, level_end, short = level_begin, count, 0
-            by_roads, number = self._prepare(body, model.counts, arrays[0], first, level_end, number, steps)
-            ending = int(device.host(self._laid)[0]) if by_roads else 0
+            by_roads = roads.lay(model, arrays[0], first, level_end, steps)
             while first < level_end and not short:
                 now = time.perf_counter()
-                parents = min(self._chunk, level_end - first)
+                # what will find no room need not be checked
+                wanted = max(LEAST, int(1.1 * (settings.capacity - count) / max(fan, 0.1)))
+                parents = min(self._chunk, level_end - first, wanted)
                 if until is not None:
                     parents = _in_time(parents, until - now, pace)
                     if not parents:
                         stopped_by = "time"
                         break
+                before = count
                 grow_level(
-                    body.kind, by_roads, *fixed[1:], first, first + parents, count, steps,
-                    self._roads, self._rows, number, *arrays, self._gait,
-                    self._child, self._child_proof, self._block, self._grown,
+                    body.kind, by_roads, device.share(), self._grains[by_roads], *fixed, first,
+                    first + parents, count, steps, roads.number, roads.links, roads.rows, *arrays,
+                    roads.gait, self._child, self._child_proof, self._block, self._grown,
                 )  # fmt: skip
                 count, short = (int(n) for n in device.host(self._grown))
+                fan = (count - before) / parents
                 first += parents
                 pace = max(0.5 * pace, (time.perf_counter() - now) / parents)
-            number = ending
-            if by_roads:
-                self._gaits, self._ends = self._ends, self._gaits
             depth += count > level_end
             if short:
                 stopped_by = "capacity"
@@ -309,24 +302,6 @@ class TreeGrower:
         if not device.resident():
             arrays = tuple(array[:count] for array in arrays)
         return Tree(model, *arrays, root_pose, count, start, depth, stopped_by)
-
-
-    def _prepare(self, body, counts, pose, first, last, number, steps):
-        if number == 0:
-            if last - first < 32 or last - first > 4096:
-                return False, 0
-            number = sort_gaits(
-                body.kind, body.numbers, pose, first, last, self._slots, self._gait, self._gaits
-            )
-        if number <= 0 or number * RATIO > last - first:
-            return False, 0
-        lay_roads(
-            body.kind, body.numbers, counts, body.braking, body.controls, self._gaits, number,
-            steps, self._slots, self._roads, self._rows, self._ends, self._laid,
-        )
-        if int(device.host(self._laid)[0]) < 0:
-            return False, 0
-        return True, number
 
 
 def _in_time(parents: int, left: float, pace: float) -> int:
