@@ -201,7 +201,7 @@ def road_cost(
     spent = 0.0
     done = 0
     for n in ti.static(range(samples)):
-        at = steps * (n + 1) // samples
+        at = (steps * (n + 1) + samples - 1) // samples
         if at > done:
             q = placed(rows, roads[road, 0] + at, start[X], start[Y], start[C], start[S])
             after = cost_at(guide, ahead, guide_frame, q)
@@ -381,7 +381,7 @@ def grow_level(
                         m = (parent - first) * per_parent + k
                         if child_proof[m] > 0:
                             q = pose7(0.0)
-                            spent, there, after, end, seconds = 0.0, 0.0, 0.0, 0.0, 0.0
+                            spent, there, after, at_rest_cost, seconds = 0.0, 0.0, 0.0, 0.0, 0.0
                             if ti.static(by_roads):
                                 road = gait[parent] * per_parent + k
                                 start = pose_of(pose, parent)
@@ -395,7 +395,7 @@ def grow_level(
                                 brake = number * per_parent + roads[road, 4] * counts[6]
                                 brake += child_proof[m] - 1
                                 seconds = roads[brake, 1] * numbers[1]
-                                after, end = road_cost(
+                                after, at_rest_cost = road_cost(
                                     guide, ahead, guide_frame, numbers, roads, rows, brake,
                                     roads[brake, 1], BRAKING_SAMPLES, q, there,
                                 )  # fmt: skip
@@ -403,7 +403,7 @@ def grow_level(
                                 q = pose_of(child, m)
                                 spent = child[m, 7]
                                 there = child[m, 8]
-                                after, end, seconds = braking_cost(
+                                after, at_rest_cost, seconds = braking_cost(
                                     kind, guide, ahead, guide_frame, numbers, robot_of(numbers), q,
                                     there, control_of(braking, child_proof[m] - 1),
                                 )  # fmt: skip
@@ -419,7 +419,7 @@ def grow_level(
                             cost[at, 0] = spent
                             cost[at, 1] = there
                             cost[at, 2] = after
-                            cost[at, 3] = end
+                            cost[at, 3] = at_rest_cost
                             cost[at, 4] = seconds
                             at += 1
                 elif fits:

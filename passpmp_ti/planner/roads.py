@@ -11,9 +11,9 @@ from passpmp_ti.robots import Robot
 
 GAITS = 1024
 """Most gaits of a level; a power of two."""
-ROWS = 1 << 20
+ROWS = 1 << 21
 """Samples and sections of all roads of a level; what is never written costs nothing on a CPU."""
-WORTH = 2
+WORTH = 4
 """Nodes that there must be for each gait: for fewer, laying roads takes longer than they save."""
 FEWEST, MOST = 32, 4096
 """Nodes of a level whose gaits are sorted out one after the other. Of those that were grown along
