@@ -48,7 +48,7 @@ def random_states(robot, n, generator):
 
 
 @pytest.mark.parametrize("robot", [CAR, CHAIR], ids=["car", "chair"])
-def test_samples_are_those_of_the_integrator_to_a_tenth_of_a_millimetre(robot):
+def test_samples_are_those_of_the_integrator_to_a_tenth_of_a_millimetre(robot, always):
     settings = Settings.for_robot(robot)
     model, generator = open_model(robot, settings), np.random.default_rng(0)
     body, steps = model.body, 20
@@ -138,8 +138,9 @@ def same_but_at_borders(model, a, b):
     assert (a.link[at_a, 2:4] == b.link[at_b, 2:4]).all()
     np.testing.assert_allclose(a.pose[at_a], b.pose[at_b], atol=2e-4)
     np.testing.assert_allclose(a.cost[at_a, :2], b.cost[at_b, :2], rtol=1e-4, atol=1e-4)
-    # along a braking the guide is asked at other places
-    np.testing.assert_allclose(a.cost[at_a, 2:], b.cost[at_b, 2:], rtol=0.1, atol=0.1)
+    # without roads, costs along a braking are those of a few long steps
+    assert np.abs(a.cost[at_a, 3] - b.cost[at_b, 3]).mean() < 0.05
+    assert np.abs(a.cost[at_a, 4] - b.cost[at_b, 4]).mean() < 2 * model.settings.time_step
     for node in at_a[a.link[at_a, PROOF] != b.link[at_b, PROOF]]:
         assert border(model, a, *a.link[node, :3])
     return len(shared)
@@ -148,8 +149,8 @@ def same_but_at_borders(model, a, b):
 def both_ways(model, guide, state, monkeypatch):
     """(tree along roads, tree by integration and all looks)."""
     start = model.stamp + model.settings.cycle
-    # room for all, so that no node moves another one out
-    settings = model.settings.changed(capacity=12000, primitives=model.settings.primitives[:3])
+    # room for all nodes, so that none moves another one out, and for all roads
+    settings = model.settings.changed(capacity=12000, primitives=model.settings.primitives[:2])
     along = TreeGrower(model.robot, settings).grow(model, guide, state, start, -1)
     object.__setattr__(model, "spans", np.full_like(model.spans, SAYS_NOTHING))
     never(monkeypatch)
@@ -182,7 +183,7 @@ def test_so_it_is_in_worlds_that_nothing_made(robot, seed, always, monkeypatch):
     model = model_with(ticks, robot, settings)
     state = np.array([0.0, 0.0, generator.uniform(-3, 3), 0.5, 0.0])
     along, stepwise = both_ways(model, straight_guide(), state, monkeypatch)
-    assert along.count > 100
+    assert along.count > 50
     assert same_but_at_borders(model, along, stepwise) > 0.99 * stepwise.count
 
 
