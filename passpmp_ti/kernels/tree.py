@@ -8,12 +8,16 @@ Nodes are rows of flat arrays, parents before children, siblings side by side.
     cost [cap, 5] f32: 0 integral of the guide along the plan to the node, 1 guide at the node,
         2 integral along the braking that proves the node, 3 guide at its end, 4 its duration [s]
 
+A level of few gaits for its nodes is grown along roads (kernels/roads.py), any other one by
+integrating from each node.
+
 A level is grown in chunks of parents, so that what is kept of the children between their check and
 their place in the tree stays small whatever the tree's size.
 """
 
 import taichi as ti
 
+from passpmp_ti.kernels.along import placed, proving_road, road_clear, road_end
 from passpmp_ti.kernels.check import (
     Arrival,
     Counts,
@@ -28,9 +32,6 @@ from passpmp_ti.kernels.check import (
 from passpmp_ti.kernels.guide import guide_at
 from passpmp_ti.kernels.motion import (
     CAR,
-    THETA,
-    A,
-    B,
     C,
     S,
     X,
@@ -45,7 +46,6 @@ from passpmp_ti.kernels.motion import (
     speed_of,
     step,
 )
-from passpmp_ti.kernels.roads import placed, proving_road, road_clear
 from passpmp_ti.kernels.spans import Spans
 
 GROWN, BRAKED = 0, 1
@@ -209,17 +209,6 @@ def road_cost(
             before = after
             done = at
     return spent, before
-
-
-@ti.func
-def road_end(rows: ti.template(), roads: ti.template(), road, steps, start):
-    """The pose at the end of a primitive's road."""
-    row = roads[road, 2]
-    q = placed(rows, roads[road, 0] + steps, start[X], start[Y], start[C], start[S])
-    q[THETA] = start[THETA] + rows[row, 0]
-    q[A] = rows[row, 1]
-    q[B] = rows[row, 2]
-    return q
 
 
 @ti.func

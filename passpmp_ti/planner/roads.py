@@ -6,7 +6,8 @@ import numpy as np
 
 from passpmp_ti import device
 from passpmp_ti.grid.model import FutureModel
-from passpmp_ti.kernels.roads import lay_roads, sort_gaits
+from passpmp_ti.kernels.gaits import sort_gaits
+from passpmp_ti.kernels.roads import lay_roads
 from passpmp_ti.robots import Robot
 
 GAITS = 1024
@@ -15,6 +16,8 @@ ROWS = 1 << 21
 """Samples and sections of all roads of a level; what is never written costs nothing on a CPU."""
 WORTH = 4
 """Nodes that there must be for each gait: for fewer, laying roads takes longer than they save."""
+PIECE = 16
+"""Gaits whose roads one thread of a CPU lays in one go."""
 FEWEST, MOST = 32, 4096
 """Nodes of a level whose gaits are sorted out one after the other. Of those that were grown along
 roads themselves, the gaits are known."""
@@ -67,8 +70,9 @@ class Roads:
         if not 0 < WORTH * number <= last - first:
             return False
         lay_roads(
-            body.kind, body.numbers, model.counts, body.braking, body.controls, self._gaits, number,
-            steps, self._slots, self.links, self.rows, self._ends, self._laid,
+            body.kind, device.share(), 1 if device.resident() else PIECE, body.numbers,
+            model.counts, body.braking, body.controls, self._gaits, number, steps, self._slots,
+            self.links, self.rows, self._ends, self._laid,
         )  # fmt: skip
         ending = int(device.host(self._laid)[0])
         if ending < 0:
