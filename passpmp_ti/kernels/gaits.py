@@ -72,22 +72,22 @@ def sort_gaits(
     # out
     gait: Counts,  # [cap]
     gaits: Table,  # [G, 2]: their speeds
-) -> ti.i32:
-    """How many gaits there are; -1: more than there is room for."""
-    number = 0
+    found: Counts,  # [1]: how many gaits there are; -1: more than there is room for
+):
     ti.loop_config(serialize=True)
     for slot in range(slots.shape[0]):
         slots[slot] = -1
     ti.loop_config(serialize=True)
     for _ in range(1):
         n = first
+        number = 0
         while n < last and number >= 0:
-            found, number_now = gait_for(
+            its_gait, number_now = gait_for(
                 kind, numbers, pose[n, A], pose[n, B], number, gaits, slots
             )
-            gait[n] = found
+            gait[n] = its_gait
             number = number_now
-            if found < 0:
+            if its_gait < 0:
                 number = -1
             n += 1
-    return number
+        found[0] = number

@@ -8,8 +8,10 @@ from passpmp_ti import device
 from passpmp_ti.grid.model import FutureModel
 from passpmp_ti.kernels.gaits import sort_gaits
 from passpmp_ti.kernels.roads import lay_roads
+from passpmp_ti.launch import Launch
 from passpmp_ti.robots import Robot
 
+SORT_GAITS, LAY_ROADS = Launch(sort_gaits, 1), Launch(lay_roads, 3)
 GAITS = 1024
 """Most gaits of a level; a power of two."""
 ROWS = 1 << 21
@@ -64,12 +66,14 @@ class Roads:
         self._gaits, self._ends = self._ends, self._gaits
         self._ending = 0
         if number == 0 and FEWEST <= last - first <= MOST:
-            number = sort_gaits(
-                body.kind, body.numbers, pose, first, last, self._slots, self.gait, self._gaits
-            )
+            SORT_GAITS(
+                body.kind, body.numbers, pose, first, last, self._slots, self.gait, self._gaits,
+                self._laid,
+            )  # fmt: skip
+            number = int(device.host(self._laid)[0])
         if not 0 < WORTH * number <= last - first:
             return False
-        lay_roads(
+        LAY_ROADS(
             body.kind, device.share(), 1 if device.resident() else PIECE, body.numbers,
             model.counts, body.braking, body.controls, self._gaits, number, steps, self._slots,
             self.links, self.rows, self._ends, self._laid,

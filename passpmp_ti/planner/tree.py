@@ -24,11 +24,13 @@ from passpmp_ti.kernels.tree import (
     trail,
 )
 from passpmp_ti.kernels.tree import TICK as TICK_COLUMN
+from passpmp_ti.launch import Launch
 from passpmp_ti.planner.guide import GuideField
 from passpmp_ti.planner.roads import Roads
 from passpmp_ti.robots import Robot
 from passpmp_ti.settings import Settings
 
+GROW_LEVEL = Launch(grow_level, 4)
 ROOT = 0
 NO_PARENT = -1
 
@@ -282,7 +284,7 @@ class TreeGrower:
                         stopped_by = "time"
                         break
                 before = count
-                grow_level(
+                GROW_LEVEL(
                     body.kind, by_roads, device.share(), self._grains[by_roads], *fixed, first,
                     first + parents, count, steps, roads.number, roads.links, roads.rows, *arrays,
                     roads.gait, self._child, self._child_proof, self._block, self._grown,
