@@ -1,9 +1,9 @@
 """Launches of kernels that are compiled already.
 
-Taichi looks at each argument of each launch anew, which takes longer than a small kernel runs. Where
-all arrays are NumPy's, whose types the first launch has seen, the rest of the way is short: set the
-arguments, launch. It leads through parts of Taichi that are not declared, so where anything of them
-is not as it was, the launch is Taichi's own.
+Taichi looks at each argument of each launch anew, which takes longer than a small kernel runs.
+Where all arrays are NumPy's, whose types the first launch has seen, the rest of the way is short:
+set the arguments, launch. It leads through parts of Taichi that are not declared, so where any of
+them is missing, the launch is Taichi's own.
 """
 
 from __future__ import annotations
