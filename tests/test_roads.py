@@ -57,7 +57,7 @@ def test_samples_are_those_of_the_integrator_to_a_tenth_of_a_millimetre(robot, a
     nodes = np.concatenate((alike, alike * (1, 1, 1, 1 + 1e-7, 1 - 1e-7), alike))
     poses = to_poses(nodes, (0.0, 0.0))
     roads = Roads(robot, len(poses))
-    assert roads.lay(model, poses, 0, len(poses), steps)
+    assert roads.lay(model, poses, 0, len(poses), steps, len(poses))
     assert 40 <= roads.number <= 60
     most = 0.0
     for n in range(len(poses)):
@@ -198,6 +198,11 @@ MAKES = {
 }
 
 
+MAKES["a car that finds no room"] = lambda: grown(
+    CAR, CAR_SETTINGS.changed(capacity=700), CLUTTER, (0.0, 0, 0, 6.0, 0.0), 8.0, proof=0
+)
+
+
 @pytest.mark.parametrize("make", MAKES.values(), ids=MAKES)
 def test_neither_chunks_nor_the_run_change_a_byte(make, monkeypatch):
     first = bytes_of(make())
@@ -241,6 +246,6 @@ def test_rest_is_like_nothing_but_rest():
     poses = np.repeat(poses, 10, axis=0)
     poses = np.concatenate((poses, poses))
     roads = Roads(CAR, len(poses))
-    assert roads.lay(open_model(CAR, settings), poses, 0, len(poses), 5)
+    assert roads.lay(open_model(CAR, settings), poses, 0, len(poses), 5, len(poses))
     assert roads.number == 3
     assert len(set(roads.gait[[0, 10, 20]])) == 3

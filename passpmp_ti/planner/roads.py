@@ -16,7 +16,7 @@ GAITS = 1024
 """Most gaits of a level; a power of two."""
 ROWS = 1 << 21
 """Samples and sections of all roads of a level; what is never written costs nothing on a CPU."""
-WORTH = 4
+WORTH = 3
 """Nodes that there must be for each gait: for fewer, laying roads takes longer than they save."""
 PIECE = 16
 """Gaits whose roads one thread of a CPU lays in one go."""
@@ -47,7 +47,7 @@ class Roads:
         self.number = self._ending = 0
 
     def lay(
-        self, model: FutureModel, pose: device.Array, first: int, last: int, steps: int
+        self, model: FutureModel, pose: device.Array, first: int, last: int, steps: int, likely: int
     ) -> bool:
         """Lay the roads of nodes [first, last), the level after the last one that was asked about.
 
@@ -57,6 +57,7 @@ class Roads:
             first: its first node.
             last: the node after its last one.
             steps: of the primitives that begin there.
+            likely: about how many of them will be grown before the tree is full.
 
         Returns:
             Whether they are; not where the gaits are too many for the nodes, or for the memory.
@@ -65,13 +66,13 @@ class Roads:
         number, self.number = self._ending, 0
         self._gaits, self._ends = self._ends, self._gaits
         self._ending = 0
-        if number == 0 and FEWEST <= last - first <= MOST:
+        if number == 0 and min(last - first, likely) >= FEWEST and last - first <= MOST:
             SORT_GAITS(
                 body.kind, body.numbers, pose, first, last, self._slots, self.gait, self._gaits,
                 self._laid,
             )  # fmt: skip
             number = int(device.host(self._laid)[0])
-        if not 0 < WORTH * number <= last - first:
+        if not 0 < WORTH * number <= min(last - first, likely):
             return False
         LAY_ROADS(
             body.kind, device.share(), 1 if device.resident() else PIECE, body.numbers,

@@ -40,7 +40,7 @@ CHUNK = 1 << 16
 GRAIN, ROADS_GRAIN, BLOCKS = 16, device.SHARE, 16
 """Children that a thread of a CPU checks in one go, the same along roads, and blocks of parents
 that are given their slots side by side."""
-LEAST = 256
+LEAST = 64
 """Parents of a chunk that is no larger than what room is left for: a launch costs as much."""
 DEVICE_CHUNK, DEVICE_BLOCKS = 1 << 20, 1024
 """The same on a device, where each thread checks one child."""
@@ -272,11 +272,13 @@ class TreeGrower:
         pace, fan = 0.0, float(len(body.controls))
         for steps in settings.levels:
             first, level_end, short = level_begin, count, 0
-            by_roads = roads.lay(model, arrays[0], first, level_end, steps)
+            # by the whole level before, however its chunks were: the choice is part of the tree
+            likely = _parents_for(settings.capacity - count, fan)
+            by_roads = roads.lay(model, arrays[0], first, level_end, steps, likely)
             while first < level_end and not short:
                 now = time.perf_counter()
                 # what will find no room need not be checked
-                wanted = max(LEAST, int(1.1 * (settings.capacity - count) / max(fan, 0.1)))
+                wanted = max(LEAST, _parents_for(settings.capacity - count, fan))
                 parents = min(self._chunk, level_end - first, wanted)
                 if until is not None:
                     parents = _in_time(parents, until - now, pace)
@@ -293,6 +295,7 @@ class TreeGrower:
                 fan = (count - before) / parents
                 first += parents
                 pace = max(0.5 * pace, (time.perf_counter() - now) / parents)
+            fan = (count - level_end) / (level_end - level_begin)
             depth += count > level_end
             if short:
                 stopped_by = "capacity"
@@ -304,6 +307,11 @@ class TreeGrower:
         if not device.resident():
             arrays = tuple(array[:count] for array in arrays)
         return Tree(model, *arrays, root_pose, count, start, depth, stopped_by)
+
+
+def _parents_for(room: int, fan: float) -> int:
+    """How many parents are likely to fill the room for some nodes, at `fan` children each."""
+    return int(1.1 * room / max(fan, 0.1)) + 1
 
 
 def _in_time(parents: int, left: float, pace: float) -> int:
