@@ -216,6 +216,12 @@ def test_neither_chunks_nor_the_run_change_a_byte(make, monkeypatch):
 def test_arrays_apart_from_the_host_give_the_same_tree(make, monkeypatch):
     # a guide that is looked up is found otherwise there
     monkeypatch.setattr(Guide, "field", lambda *a: straight_guide())
+    monkeypatch.setattr(roads_module, "DEVICE_WORTH", roads_module.WORTH)
+    first = bytes_of(make())
+    with device.forced():
+        assert bytes_of(make()) == first
+    # where roads are not laid, a device integrates as the host does
+    never(monkeypatch)
     first = bytes_of(make())
     with device.forced():
         assert bytes_of(make()) == first

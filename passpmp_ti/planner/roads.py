@@ -16,8 +16,9 @@ GAITS = 1024
 """Most gaits of a level; a power of two."""
 ROWS = 1 << 21
 """Samples and sections of all roads of a level; what is never written costs nothing on a CPU."""
-WORTH = 3
-"""Nodes that there must be for each gait: for fewer, laying roads takes longer than they save."""
+WORTH, DEVICE_WORTH = 3, 1 << 30
+"""Nodes that there must be for each gait: for fewer, laying roads takes longer than they save. On a
+device every child is integrated at once; gaits would be sorted out by one slow thread."""
 PIECE = 16
 """Gaits whose roads one thread of a CPU lays in one go."""
 FEWEST, MOST = 32, 4096
@@ -72,7 +73,7 @@ class Roads:
                 self._laid,
             )  # fmt: skip
             number = int(device.host(self._laid)[0])
-        if not 0 < WORTH * number <= min(last - first, likely):
+        if not 0 < worth * number <= nodes:
             return False
         LAY_ROADS(
             body.kind, device.share(), 1 if device.resident() else PIECE, body.numbers,

@@ -42,7 +42,7 @@ GRAIN, ROADS_GRAIN, BLOCKS = 16, device.SHARE, 16
 that are given their slots side by side."""
 LEAST = 64
 """Parents of a chunk that is no larger than what room is left for: a launch costs as much."""
-DEVICE_CHUNK, DEVICE_BLOCKS = 1 << 20, 1024
+DEVICE_CHUNK, DEVICE_BLOCKS, DEVICE_LEAST = 1 << 20, 1024, 1 << 14
 """The same on a device, where each thread checks one child."""
 FILLED = 0.5
 """Share of the memory that a tree may fill: the rest is for the model, the swarm and others."""
@@ -227,6 +227,7 @@ class TreeGrower:
         resident = device.resident()
         self._chunk = max(1, min(settings.capacity, (DEVICE_CHUNK if resident else CHUNK) // fan))
         self._blocks = DEVICE_BLOCKS if resident else BLOCKS
+        self._least = DEVICE_LEAST if resident else LEAST
         self._grains = (1, 1) if resident else (GRAIN, ROADS_GRAIN)
         self._child = device.empty((self._chunk * fan, 9), np.float32)
         self._child_proof = device.empty((self._chunk * fan,), np.int32)
@@ -278,7 +279,7 @@ class TreeGrower:
             while first < level_end and not short:
                 now = time.perf_counter()
                 # what will find no room need not be checked
-                wanted = max(LEAST, _parents_for(settings.capacity - count, fan))
+                wanted = max(self._least, _parents_for(settings.capacity - count, fan))
                 parents = min(self._chunk, level_end - first, wanted)
                 if until is not None:
                     parents = _in_time(parents, until - now, pace)
