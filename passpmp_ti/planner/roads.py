@@ -67,7 +67,9 @@ class Roads:
         number, self.number = self._ending, 0
         self._gaits, self._ends = self._ends, self._gaits
         self._ending = 0
-        if number == 0 and min(last - first, likely) >= FEWEST and last - first <= MOST:
+        nodes = min(last - first, likely)
+        worth = DEVICE_WORTH if device.resident() else WORTH
+        if number == 0 and nodes >= max(FEWEST, worth) and last - first <= MOST:
             SORT_GAITS(
                 body.kind, body.numbers, pose, first, last, self._slots, self.gait, self._gaits,
                 self._laid,
