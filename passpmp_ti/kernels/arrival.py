@@ -7,6 +7,7 @@ dist(p, static or unseen) <= clearance: DESIGN of the conservative model, Fig. 4
 import taichi as ti
 
 from passpmp_ti.kernels.beams import SLACK
+from passpmp_ti.kernels.launch import kernel
 from passpmp_ti.kernels.spread import evens_first
 
 NEVER = 65535
@@ -164,7 +165,7 @@ def way_to(square, border):
     return ti.select(square >= none, NO_SEED, ti.sqrt(ti.cast(square, ti.f32)))
 
 
-@ti.kernel
+@kernel
 def arrival_times(
     # in
     seen: Cells,
@@ -246,7 +247,7 @@ def arrival_times(
                 arrival[j, b * LANES + lane] = ti.cast(ticks[lane], ti.u16)
 
 
-@ti.kernel
+@kernel
 def cap_memory(
     # in
     to_intruder: Distances,
@@ -272,7 +273,7 @@ def cap_memory(
         remembered[j, i] = ti.cast(ti.min(kept, ticks), ti.u16)
 
 
-@ti.kernel
+@kernel
 def contradicted(
     # in
     points: ti.types.ndarray(dtype=ti.f32, ndim=2),  # [N, 2] returns

@@ -20,6 +20,8 @@ body, a declared clearing). Rows of `view` (f32): 0 x, 1 y, 2 bearing of beam 0 
 
 import taichi as ti
 
+from passpmp_ti.kernels.launch import kernel
+
 LOST, NOTHING, MOVABLE, STATIC, STATIC_BY_MAP = -1, 0, 1, 2, 3
 """What a beam met."""
 DOUBTED = -4
@@ -81,7 +83,7 @@ def met_at(met: ti.template(), n, closed, beam):
     return label
 
 
-@ti.kernel
+@kernel
 def label_by_map(
     # in
     ranges: Floats,  # [n]
@@ -137,7 +139,7 @@ def label_by_map(
             met[beam] = MOVABLE
 
 
-@ti.kernel
+@kernel
 def prove_wedges(
     # in
     ranges: Floats,  # [n]

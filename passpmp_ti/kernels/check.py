@@ -24,6 +24,7 @@ Shared parameters:
 
 import taichi as ti
 
+from passpmp_ti.kernels.launch import kernel
 from passpmp_ti.kernels.motion import (
     CAR,
     A,
@@ -40,6 +41,8 @@ from passpmp_ti.kernels.motion import (
     moved,
     pose7,
     robot6,
+    seen_from,
+    setting_off,
     speed_of,
     steered,
     step,
@@ -311,7 +314,7 @@ def proving_brake(
     return proof
 
 
-@ti.kernel
+@kernel
 def check_states(
     # in
     kind: ti.template(),
@@ -335,7 +338,7 @@ def check_states(
         )
 
 
-@ti.kernel
+@kernel
 def check_path(
     # in
     kind: ti.template(),
@@ -364,7 +367,7 @@ def check_path(
                     touched[n] = 1
 
 
-@ti.kernel
+@kernel
 def trace(
     # in
     kind: ti.template(),
@@ -387,10 +390,13 @@ def trace(
         written = 1
         for m in range(parts):
             control = control_of(controls, n * parts + m)
+            start_of_part = q
+            seen = setting_off(q)
             direction = heading_for(kind, q)
             left = steps[n * parts + m]
             while written < rows and (left > 0 or (left < 0 and not at_rest(kind, q))):
-                q = step(kind, robot, q, control, direction, numbers[1])
+                seen = step(kind, robot, seen, control, direction, numbers[1])
+                q = seen_from(start_of_part, seen)
                 for r in ti.static(range(7)):
                     path[n * rows + written, r] = q[r]
                 written += 1

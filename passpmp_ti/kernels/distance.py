@@ -7,10 +7,12 @@ and would free cells that are not free.
 
 import taichi as ti
 
+from passpmp_ti.kernels.launch import kernel
+
 FAR = 30000  # cells; its square still fits an i32
 
 
-@ti.kernel
+@kernel
 def column_distance(
     # in
     mask: ti.types.ndarray(dtype=ti.u8, ndim=2),  # [J, I]: 0 marks a seed
@@ -31,7 +33,7 @@ def column_distance(
             column[j, i] = d
 
 
-@ti.kernel
+@kernel
 def row_distance(
     # in
     column: ti.types.ndarray(dtype=ti.i32, ndim=2),  # [J, I]

@@ -9,6 +9,8 @@ Not part of the guarantee: a wrong guide costs time, never safety.
 
 import taichi as ti
 
+from passpmp_ti.kernels.launch import kernel
+
 UNREACHED = 1e9
 SETTLED = 5e-4  # share of its slowness by which a cell's time must fall to count as changed
 
@@ -37,7 +39,7 @@ def fallen(old, a, b, slowness):
     return result
 
 
-@ti.kernel
+@kernel
 def block(
     # in
     cells: Whole,  # [N, 2] row and column of walls
@@ -56,7 +58,7 @@ def block(
                     blocked[j, i] = ti.u8(1)  # whoever else writes here writes the same
 
 
-@ti.kernel
+@kernel
 def lay_out(
     # in
     numbers: ti.types.ndarray(dtype=ti.f32, ndim=1),  # [5], see below
@@ -86,7 +88,7 @@ def lay_out(
                 time[j, i] = 0.0
 
 
-@ti.kernel
+@kernel
 def point_ahead(
     # in
     time: Field,  # [J, I]

@@ -5,6 +5,8 @@ Not part of the guarantee: a wrong guide costs time, never safety.
 
 import taichi as ti
 
+from passpmp_ti.kernels.launch import kernel
+
 Field = ti.types.ndarray(dtype=ti.f32, ndim=2)  # [J, I]
 
 
@@ -49,7 +51,7 @@ def guide_at(time: ti.template(), ahead: ti.template(), frame: ti.template(), x,
     return cost
 
 
-@ti.kernel
+@kernel
 def guide_costs(
     # in
     time: Field,

@@ -4,6 +4,9 @@ A pose on the device is seven numbers (x, y, cos theta, sin theta, theta, a, b):
 and b = xi, for a differential drive a = v_r and b = v_l. Both models are integrated by the
 midpoint rule: turn by half, move, turn by half; its order two is measured in the tests.
 
+Primitives are integrated as seen from where they begin, and then put there: small numbers are
+rounded less, and the same whatever the place and the heading.
+
 Robot parameters, as `Robot.parameters` gives them:
     0 top speed, 1 lowest speed, 2 top steering angle, 3 half the inverse of wheelbase or track,
     4 top acceleration, 5 unused.
@@ -18,6 +21,26 @@ pose7 = ti.types.vector(7, ti.f32)
 robot6 = ti.types.vector(6, ti.f32)
 control3 = ti.types.vector(3, ti.f32)
 X, Y, C, S, THETA, A, B = range(7)
+
+
+@ti.func
+def setting_off(q: pose7):
+    """A robot with q's speeds, as seen from where it is."""
+    return pose7(0.0, 0.0, 1.0, 0.0, 0.0, q[A], q[B])
+
+
+@ti.func
+def seen_from(start: pose7, q: pose7):
+    """Where a robot is that is at q as seen from `start`."""
+    return pose7(
+        start[X] + start[C] * q[X] - start[S] * q[Y],
+        start[Y] + start[S] * q[X] + start[C] * q[Y],
+        start[C] * q[C] - start[S] * q[S],
+        start[S] * q[C] + start[C] * q[S],
+        start[THETA] + q[THETA],
+        q[A],
+        q[B],
+    )
 
 
 @ti.func
@@ -36,10 +59,10 @@ def tangent(angle):
 
 @ti.func
 def sine_and_cosine(angle):
-    """(sin, cos) of a small angle: the series is exact to f32 below 0.15 rad, to 4e-7 at 0.25."""
+    """(sin, cos) of a small angle: the series is exact to f32 below 0.5 rad."""
     q = angle * angle
-    sin = angle * (1.0 - q * (1.0 / 6.0 - q * (1.0 / 120.0)))
-    cos = 1.0 - q * (0.5 - q * (1.0 / 24.0))
+    sin = angle * (1.0 - q * (1.0 / 6.0 - q * (1.0 / 120.0 - q * (1.0 / 5040.0))))
+    cos = 1.0 - q * (0.5 - q * (1.0 / 24.0 - q * (1.0 / 720.0)))
     return sin, cos
 
 

@@ -2,6 +2,7 @@
 
 import taichi as ti
 
+from passpmp_ti.kernels.launch import kernel
 from passpmp_ti.kernels.tree import CHILDREN, TICK, Links
 
 WEIGHT_DISTANCE, WEIGHT_TIME, SPAN, FINAL, TICK_LENGTH = range(5)
@@ -31,7 +32,7 @@ def plan_cost(leaf, link: ti.template(), cost: ti.template(), numbers: ti.templa
     return numbers[WEIGHT_DISTANCE] * distance + numbers[WEIGHT_TIME] * elapsed
 
 
-@ti.kernel
+@kernel
 def every_cost(
     # in
     count: ti.i32,
@@ -48,7 +49,7 @@ def every_cost(
             f[n] = plan_cost(n, link, cost, numbers)
 
 
-@ti.kernel
+@kernel
 def cheapest(
     # in
     count: ti.i32,  # nodes in the tree

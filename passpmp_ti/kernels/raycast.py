@@ -2,6 +2,8 @@
 
 import taichi as ti
 
+from passpmp_ti.kernels.launch import kernel
+
 vec2 = ti.types.vector(2, ti.f32)
 
 NOTHING, STATIC, MOVING = 0, 1, 2
@@ -36,7 +38,7 @@ def meet_disc(ray: vec2, centre: vec2, radius: ti.f32) -> ti.f32:
     return found
 
 
-@ti.kernel
+@kernel
 def cast_rays(
     # in
     rays: ti.types.ndarray(dtype=ti.f32, ndim=2),  # [n, 2] unit vectors

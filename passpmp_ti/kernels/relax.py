@@ -3,6 +3,7 @@
 import taichi as ti
 
 from passpmp_ti.kernels.eikonal import Field, Whole, fallen
+from passpmp_ti.kernels.launch import kernel
 
 TILE = 8  # cells along a side of what one thread relaxes
 TURNS = 16  # in one launch; an even number
@@ -47,7 +48,7 @@ def stirred_about(stirred: ti.template(), tile_j, tile_i):
     return ti.max(last, stirred[tile_j, tile_i])
 
 
-@ti.kernel
+@kernel
 def relax(
     # in
     slowness: Field,  # [J, I]

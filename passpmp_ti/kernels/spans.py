@@ -11,6 +11,8 @@ free, from its greatest on none of it is. Both may say less than is true, never 
 
 import taichi as ti
 
+from passpmp_ti.kernels.launch import kernel
+
 LEVELS = 7
 BEGIN = 8
 """Where the levels' offsets begin in `counts`."""
@@ -80,7 +82,7 @@ def column_of_three(pooled: ti.template(), begin, wide, rows, row, column):
     return ti.math.ivec2(least, greatest)
 
 
-@ti.kernel
+@kernel
 def lay_spans(
     # in
     arrival: ti.types.ndarray(dtype=ti.u16, ndim=2),  # [J, I]

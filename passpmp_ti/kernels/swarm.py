@@ -26,6 +26,7 @@ search ends. Parents must be numbered as their children are, as a tree grown by 
 import taichi as ti
 
 from passpmp_ti.kernels.draws import drawn, stream
+from passpmp_ti.kernels.launch import kernel
 from passpmp_ti.kernels.objective import TICK_LENGTH, Costs, Numbers, plan_cost
 from passpmp_ti.kernels.tree import CHILDREN, FIRST, PARENT, STEPS, Links
 
@@ -252,7 +253,7 @@ def forget(row, mask, keys: ti.template(), ends: ti.template(), least: ti.templa
     least[row] = ti.math.inf
 
 
-@ti.kernel
+@kernel
 def search(
     # in
     seed: ti.u32,
@@ -292,7 +293,7 @@ def search(
                 elect(group, first, last, mask, room, link, keys, state, ends, least)
 
 
-@ti.kernel
+@kernel
 def forget_all(
     rows: ti.i32,
     slots: ti.i32,
@@ -310,7 +311,7 @@ def forget_all(
         least[row] = ti.math.inf
 
 
-@ti.kernel
+@kernel
 def search_together(
     # in
     begin: ti.i32,  # iterations [begin, begin + TURNS) are done, up to and with `iterations`

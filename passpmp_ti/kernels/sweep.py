@@ -3,6 +3,7 @@
 import taichi as ti
 
 from passpmp_ti.kernels.eikonal import Field, Whole, fallen
+from passpmp_ti.kernels.launch import kernel
 
 
 @ti.func
@@ -62,7 +63,7 @@ def sweep_row(
     return fell
 
 
-@ti.kernel
+@kernel
 def sweep(
     # in
     slowness: Field,  # [J, I]

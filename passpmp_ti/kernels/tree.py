@@ -8,12 +8,16 @@ Nodes are rows of flat arrays, parents before children, siblings side by side.
     cost [cap, 5] f32: 0 integral of the guide along the plan to the node, 1 guide at the node,
         2 integral along the braking that proves the node, 3 guide at its end, 4 its duration [s]
 
+A level of few gaits for its nodes is grown along roads (kernels/roads.py), any other one by
+integrating from each node.
+
 A level is grown in chunks of parents, so that what is kept of the children between their check and
 their place in the tree stays small whatever the tree's size.
 """
 
 import taichi as ti
 
+from passpmp_ti.kernels.along import placed, proving_road, road_clear, road_end
 from passpmp_ti.kernels.check import (
     Arrival,
     Counts,
@@ -26,6 +30,7 @@ from passpmp_ti.kernels.check import (
     way_clear,
 )
 from passpmp_ti.kernels.guide import guide_at
+from passpmp_ti.kernels.launch import kernel
 from passpmp_ti.kernels.motion import (
     CAR,
     C,
@@ -36,6 +41,8 @@ from passpmp_ti.kernels.motion import (
     braking_steps,
     heading_for,
     pose7,
+    seen_from,
+    setting_off,
     setting_out,
     speed_of,
     step,
@@ -46,8 +53,11 @@ GROWN, BRAKED = 0, 1
 """What a node is: the end of a primitive, or the rest that a braking trajectory leads to."""
 
 PARENT, CONTROL, STEPS, TICK, PROOF, FIRST, CHILDREN, WHAT = range(8)
-SAMPLES = 2  # of the guide along a primitive, after its beginning
-BRAKING_SAMPLES = 4  # the same along a braking
+FEW = 256  # parents that are given their slots in one go
+SAMPLES, BRAKING_SAMPLES = 4, 4
+"""Samples of the guide along a primitive, and along a braking. Each stands for the piece that it
+ends: a plan is judged by where it leads, and one that has to turn away first is not held up by it.
+Trapezoids of them drove faster among movers, but a car could stand before its goal for good."""
 
 Links = ti.types.ndarray(dtype=ti.i32, ndim=2)
 
@@ -90,7 +100,7 @@ def braking_cost(
     seconds = (braking_steps(kind, start, control, numbers[1]) - 2) * numbers[1]
     pace = seconds * (1.0 / BRAKING_SAMPLES)
     q = start
-    before = here
+    there = here
     spent = 0.0
     if seconds > 0.0:
         for _ in range(BRAKING_SAMPLES):
@@ -101,10 +111,9 @@ def braking_cost(
                     length = 1.0 / ti.max(ti.sqrt(q[C] * q[C] + q[S] * q[S]), 1e-3)
                     q[C] *= length
                     q[S] *= length
-            after = cost_at(guide, ahead, guide_frame, q)
-            spent += 0.5 * (before + after) * pace
-            before = after
-    return spent, before, seconds
+            there = cost_at(guide, ahead, guide_frame, q)
+            spent += there * pace
+    return spent, there, seconds
 
 
 @ti.func
@@ -120,13 +129,12 @@ def driven_clear(
     robot,
     start,
     start_tick,
-    here,
     control,
     steps,
 ):
     """(whether a primitive from `start` touches nothing, its end, integral of the guide along it,
     guide at its end). Waiting is not checked, leaving is."""
-    q = start
+    q = setting_off(start)
     tick = start_tick
     direction = heading_for(kind, q)
     towards = setting_out(kind, q, control)
@@ -135,7 +143,7 @@ def driven_clear(
     free = 0
     level = 2
     spent = 0.0
-    before_cost = here
+    there = 0.0
     pace = ti.max((steps + SAMPLES - 1) // SAMPLES, 1)
     since = 0
     k = 0
@@ -149,8 +157,9 @@ def driven_clear(
             fastest = speed_of(kind, q) + gain * left * numbers[1]
             # as a braking it would cover half of the way that it covers at one speed
             free, level = free_steps(
-                spans, numbers, counts, q, ti.min(fastest, robot[0]), towards, tick, 2 * left, level
-            )
+                spans, numbers, counts, seen_from(start, q), ti.min(fastest, robot[0]), towards,
+                tick, 2 * left, level,
+            )  # fmt: skip
         before = q
         q = step(kind, robot, q, control, direction, numbers[1])
         if free > 0:
@@ -158,18 +167,48 @@ def driven_clear(
         else:
             still = at_rest(kind, q)
             if not (resting and still):
-                clear = way_clear(arrival, numbers, counts, before, q, tick)
+                clear = way_clear(
+                    arrival, numbers, counts, seen_from(start, before), seen_from(start, q), tick
+                )
             free += 1
         resting = at_rest(kind, q)
         tick += counts[4]
         k += 1
         since += 1
         if since == pace or k == steps:
-            after = cost_at(guide, ahead, guide_frame, q)
-            spent += 0.5 * (before_cost + after) * since * numbers[1]
-            before_cost = after
+            there = cost_at(guide, ahead, guide_frame, seen_from(start, q))
+            spent += there * since * numbers[1]
             since = 0
-    return clear, q, spent, before_cost
+    return clear, seen_from(start, q), spent, there
+
+
+@ti.func
+def road_cost(
+    guide: ti.template(),
+    ahead: ti.template(),
+    guide_frame: ti.template(),
+    numbers: ti.template(),
+    roads: ti.template(),
+    rows: ti.template(),
+    road,
+    steps,
+    samples: ti.template(),
+    start,
+    here,
+):
+    """(integral of the guide along the first `steps` of a road from `start`, guide at its end)."""
+    there = here
+    spent = 0.0
+    done = 0
+    pace = ti.max((steps + samples - 1) // samples, 1)
+    for n in ti.static(range(samples)):
+        at = ti.min(pace * (n + 1), steps)
+        if at > done:
+            q = placed(rows, roads[road, 0] + at, start[X], start[Y], start[C], start[S])
+            there = cost_at(guide, ahead, guide_frame, q)
+            spent += there * (at - done) * numbers[1]
+            done = at
+    return spent, there
 
 
 @ti.func
@@ -195,10 +234,11 @@ def room_for(
     return found
 
 
-@ti.kernel
+@kernel
 def grow_level(
     # in
     kind: ti.template(),
+    by_roads: ti.template(),  # whether `roads` hold the ways of the parents' gaits
     share: ti.template(),  # indices that one thread is handed at a time, see device.share
     grain: ti.template(),  # children that one thread checks in one go
     arrival: Arrival,  # [J, I]
@@ -214,10 +254,14 @@ def grow_level(
     last: ti.i32,
     slot: ti.i32,  # nodes in the tree so far
     steps: ti.i32,
+    number: ti.i32,  # of the parents' gaits
+    roads: Links,  # [P, 5]
+    rows: Table,  # [R, 4]
     # in / out
     pose: Table,
     link: Links,
     cost: Table,
+    gait: Counts,  # [cap], of parents and children where `by_roads`
     # scratch
     child: Table,  # [M, 9] pose, integral of the guide, guide at the end
     child_proof: Counts,  # [M]: 1 + braking control, 0: not safe
@@ -227,7 +271,7 @@ def grow_level(
 ):
     per_parent = counts[7]
     capacity = pose.shape[0]
-    blocks = block.shape[0] - 1
+    blocks = ti.min(block.shape[0] - 1, 1 + (last - first) // FEW)
     children = (last - first) * per_parent
     for index in range((children + grain - 1) // grain * share):
         if index % share == 0:
@@ -235,12 +279,27 @@ def grow_level(
             for m in range(begin, ti.min(begin + grain, children)):
                 parent = first + m // per_parent
                 proof = 0
-                if link[parent, WHAT] == GROWN:
+                if ti.static(by_roads):
+                    if link[parent, WHAT] == GROWN:
+                        tick = link[parent, TICK]
+                        road = gait[parent] * per_parent + m % per_parent
+                        x, y = pose[parent, X], pose[parent, Y]
+                        c, s = pose[parent, C], pose[parent, S]
+                        if road_clear(
+                            arrival, spans, numbers, counts, roads, rows, road, x, y, c, s, tick
+                        ):
+                            q = placed(rows, roads[road, 0] + steps, x, y, c, s)
+                            proof = proving_road(
+                                arrival, spans, numbers, counts, roads, rows,
+                                number * per_parent + roads[road, 4] * counts[6],
+                                q[X], q[Y], q[C], q[S], tick + steps * counts[4],
+                            )  # fmt: skip
+                elif link[parent, WHAT] == GROWN:
                     robot = robot_of(numbers)
                     tick = link[parent, TICK]
                     clear, q, spent, there = driven_clear(
                         kind, arrival, spans, guide, ahead, guide_frame, numbers, counts, robot,
-                        pose_of(pose, parent), tick, cost[parent, 1],
+                        pose_of(pose, parent), tick,
                         control_of(controls, m % per_parent), steps,
                     )  # fmt: skip
                     if clear:
@@ -310,8 +369,33 @@ def grow_level(
                     for k in range(per_parent):
                         m = (parent - first) * per_parent + k
                         if child_proof[m] > 0:
-                            q = pose_of(child, m)
-                            there = child[m, 8]
+                            q = pose7(0.0)
+                            spent, there, after, at_rest_cost, seconds = 0.0, 0.0, 0.0, 0.0, 0.0
+                            if ti.static(by_roads):
+                                road = gait[parent] * per_parent + k
+                                start = pose_of(pose, parent)
+                                q = road_end(rows, roads, road, steps, start)
+                                spent, there = road_cost(
+                                    guide, ahead, guide_frame, numbers, roads, rows, road, steps,
+                                    SAMPLES, start, cost[parent, 1],
+                                )  # fmt: skip
+                                spent += cost[parent, 0]
+                                gait[at] = roads[road, 4]
+                                brake = number * per_parent + roads[road, 4] * counts[6]
+                                brake += child_proof[m] - 1
+                                seconds = roads[brake, 1] * numbers[1]
+                                after, at_rest_cost = road_cost(
+                                    guide, ahead, guide_frame, numbers, roads, rows, brake,
+                                    roads[brake, 1], BRAKING_SAMPLES, q, there,
+                                )  # fmt: skip
+                            else:
+                                q = pose_of(child, m)
+                                spent = child[m, 7]
+                                there = child[m, 8]
+                                after, at_rest_cost, seconds = braking_cost(
+                                    kind, guide, ahead, guide_frame, numbers, robot_of(numbers), q,
+                                    there, control_of(braking, child_proof[m] - 1),
+                                )  # fmt: skip
                             store_pose(pose, at, q)
                             link[at, PARENT] = parent
                             link[at, CONTROL] = k
@@ -321,14 +405,10 @@ def grow_level(
                             link[at, FIRST] = -1
                             link[at, CHILDREN] = 0
                             link[at, WHAT] = GROWN
-                            spent, end_cost, seconds = braking_cost(
-                                kind, guide, ahead, guide_frame, numbers, robot_of(numbers), q,
-                                there, control_of(braking, child_proof[m] - 1),
-                            )  # fmt: skip
-                            cost[at, 0] = child[m, 7]
+                            cost[at, 0] = spent
                             cost[at, 1] = there
-                            cost[at, 2] = spent
-                            cost[at, 3] = end_cost
+                            cost[at, 2] = after
+                            cost[at, 3] = at_rest_cost
                             cost[at, 4] = seconds
                             at += 1
                 elif fits:
@@ -358,11 +438,12 @@ def store_braking(
     start = pose_of(pose, parent)
     control = control_of(braking, link[parent, PROOF])
     robot = robot_of(numbers)
-    q = start
+    q = setting_off(start)
     taken = 0
     while not at_rest(kind, q):
         q = step(kind, robot, q, control, 0.0, numbers[1])
         taken += 1
+    q = seen_from(start, q)
     store_pose(pose, at, q)
     spent, _, _ = braking_cost(
         kind, guide, ahead, guide_frame, numbers, robot, start, cost[parent, 1], control
@@ -383,7 +464,7 @@ def store_braking(
     cost[at, 4] = 0.0
 
 
-@ti.kernel
+@kernel
 def trail(
     # in
     link: Links,  # [cap, 8]
@@ -405,7 +486,7 @@ def trail(
     return count
 
 
-@ti.kernel
+@kernel
 def plant(
     # in
     root_pose: Numbers,  # [7]

@@ -2,8 +2,10 @@
 
 import taichi as ti
 
+from passpmp_ti.kernels.launch import kernel
 
-@ti.kernel
+
+@kernel
 def squares_empty(
     # in
     seen: ti.types.ndarray(dtype=ti.u8, ndim=2),  # [J, I] 1: proven empty

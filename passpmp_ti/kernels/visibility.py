@@ -8,6 +8,7 @@ it touches as sources, except where some view shows that no mover can be.
 import taichi as ti
 
 from passpmp_ti.kernels.beams import MOVABLE, OPEN, SHUT, SLACK, STANDING, UNCOVERED, stays
+from passpmp_ti.kernels.launch import kernel
 from passpmp_ti.kernels.spread import spread, spread_over
 
 TAU = 6.2831853
@@ -365,7 +366,7 @@ def lets_through(side, other):
     return kind
 
 
-@ti.kernel
+@kernel
 def rasterise(
     # in
     view: Views,  # [V, 8]

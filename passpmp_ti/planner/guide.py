@@ -186,13 +186,14 @@ def _centres(model: FutureModel, marked: np.ndarray) -> np.ndarray:
 
 
 def mean_cost(times: np.ndarray, costs: np.ndarray, horizon: float) -> float:
-    """Cost to go averaged over `horizon` [s], the last value standing for what comes after.
+    """Cost to go averaged over `horizon` [s]; each value stands for the time before it, as in the
+    tree, and the last one for what comes after as well.
 
     Args:
         times: [n] from the start of the plan [s].
         costs: [n] cost to go then.
     """
-    spent = float(np.sum(0.5 * np.diff(times) * (costs[1:] + costs[:-1])))
+    spent = float(np.sum(np.diff(times) * costs[1:]))
     taken = float(times[-1] - times[0])
     span = max(horizon, taken)
     rest = span - taken

@@ -25,6 +25,7 @@ from passpmp_ti.kernels.tree import (
 )
 from passpmp_ti.kernels.tree import TICK as TICK_COLUMN
 from passpmp_ti.planner.guide import GuideField
+from passpmp_ti.planner.roads import Roads
 from passpmp_ti.robots import Robot
 from passpmp_ti.settings import Settings
 
@@ -34,10 +35,12 @@ NO_PARENT = -1
 
 CHUNK = 1 << 16
 """Most children that are checked in one launch: what is kept of them fits the processor's cache."""
-GRAIN, BLOCKS = 16, 16
-"""Children that a thread of a CPU checks in one go, and blocks of parents that are given their
-slots side by side."""
-DEVICE_CHUNK, DEVICE_BLOCKS = 1 << 20, 1024
+GRAIN, ROADS_GRAIN, BLOCKS = 16, device.SHARE, 16
+"""Children that a thread of a CPU checks in one go, the same along roads, and blocks of parents
+that are given their slots side by side."""
+LEAST = 64
+"""Parents of a chunk that is no larger than what room is left for: a launch costs as much."""
+DEVICE_CHUNK, DEVICE_BLOCKS, DEVICE_LEAST = 1 << 20, 1024, 1 << 14
 """The same on a device, where each thread checks one child."""
 FILLED = 0.5
 """Share of the memory that a tree may fill: the rest is for the model, the swarm and others."""
@@ -197,8 +200,8 @@ def follow(model: FutureModel, pose: np.ndarray, parts: list[tuple[np.ndarray, i
 
 
 def tree_bytes(capacity: int) -> int:
-    """What a tree of `capacity` nodes takes [bytes]."""
-    return capacity * 4 * (7 + 8 + 5)
+    """What a tree of `capacity` nodes takes, and the gaits of its nodes [bytes]."""
+    return capacity * 4 * (7 + 8 + 5 + 1)
 
 
 class TreeGrower:
@@ -222,11 +225,13 @@ class TreeGrower:
         resident = device.resident()
         self._chunk = max(1, min(settings.capacity, (DEVICE_CHUNK if resident else CHUNK) // fan))
         self._blocks = DEVICE_BLOCKS if resident else BLOCKS
-        self._grain = 1 if resident else GRAIN
+        self._least = DEVICE_LEAST if resident else LEAST
+        self._grains = (1, 1) if resident else (GRAIN, ROADS_GRAIN)
         self._child = device.empty((self._chunk * fan, 9), np.float32)
         self._child_proof = device.empty((self._chunk * fan,), np.int32)
         self._block = device.empty((self._blocks + 1,), np.int32)
         self._grown = device.empty((2,), np.int32)
+        self._roads = Roads(robot, settings.capacity)
 
     def grow(
         self, model: FutureModel, guide: GuideField, root: np.ndarray, start: float, proof: int,
@@ -257,28 +262,39 @@ class TreeGrower:
             np.array([0.0, here, 0.0, here, 0.0], dtype=np.float32),
         )
         fixed = (
-            body.kind, device.share(), self._grain, model.ticks, model.spans, guide.time,
-            guide.ahead, guide.frame, body.numbers, model.counts, body.braking, body.controls,
+            model.ticks, model.spans, guide.time, guide.ahead, guide.frame, body.numbers,
+            model.counts, body.braking, body.controls,
         )  # fmt: skip
+        roads = self._roads
+        roads.clear()
         level_begin, count, depth, stopped_by = ROOT, 1, 0, "depth"
-        pace = 0.0
+        pace, fan = 0.0, float(len(body.controls))
         for steps in settings.levels:
             first, level_end, short = level_begin, count, 0
+            # by the whole level before, however its chunks were: the choice is part of the tree
+            likely = _parents_for(settings.capacity - count, fan)
+            by_roads = roads.lay(model, arrays[0], first, level_end, steps, likely)
             while first < level_end and not short:
                 now = time.perf_counter()
-                parents = min(self._chunk, level_end - first)
+                # what will find no room need not be checked
+                wanted = max(self._least, _parents_for(settings.capacity - count, fan))
+                parents = min(self._chunk, level_end - first, wanted)
                 if until is not None:
                     parents = _in_time(parents, until - now, pace)
                     if not parents:
                         stopped_by = "time"
                         break
+                before = count
                 grow_level(
-                    *fixed, first, first + parents, count, steps, *arrays,
-                    self._child, self._child_proof, self._block, self._grown,
+                    body.kind, by_roads, device.share(), self._grains[by_roads], *fixed, first,
+                    first + parents, count, steps, roads.number, roads.links, roads.rows, *arrays,
+                    roads.gait, self._child, self._child_proof, self._block, self._grown,
                 )  # fmt: skip
                 count, short = (int(n) for n in device.host(self._grown))
+                fan = (count - before) / parents
                 first += parents
                 pace = max(0.5 * pace, (time.perf_counter() - now) / parents)
+            fan = (count - level_end) / (level_end - level_begin)
             depth += count > level_end
             if short:
                 stopped_by = "capacity"
@@ -290,6 +306,11 @@ class TreeGrower:
         if not device.resident():
             arrays = tuple(array[:count] for array in arrays)
         return Tree(model, *arrays, root_pose, count, start, depth, stopped_by)
+
+
+def _parents_for(room: int, fan: float) -> int:
+    """How many parents are likely to fill the room for some nodes, at `fan` children each."""
+    return int(1.1 * room / max(fan, 0.1)) + 1
 
 
 def _in_time(parents: int, left: float, pace: float) -> int:
