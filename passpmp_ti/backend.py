@@ -5,6 +5,8 @@ from __future__ import annotations
 import contextlib
 import io
 import logging
+import os
+from pathlib import Path
 
 from passpmp_ti import door, kernel_cache, probe
 
@@ -65,6 +67,7 @@ def init(backend: str = "auto", threads: int | None = None, *, debug: bool = Fal
             import cv2
 
             cv2.setNumThreads(threads)
+    before = _own_threads()
     try:
         _start(wanted, options)
     except RuntimeError as cause:
@@ -73,6 +76,8 @@ def init(backend: str = "auto", threads: int | None = None, *, debug: bool = Fal
         _log.warning("%s worked in a trial and does not now (%s)", wanted, cause)
         wanted = "cpu"
         _start(wanted, options)
+    if wanted == "cpu":
+        _give_each_a_core(sorted(_own_threads() - before), threads)
     if not debug:
         _shorten_first_compilation()
     _running = wanted
@@ -105,6 +110,33 @@ def _start(arch: str, options: dict[str, object]) -> None:
     # Taichi greets on standard output, which belongs to the program
     with contextlib.redirect_stdout(io.StringIO()):
         ti.init(arch=getattr(ti, arch), enable_fallback=False, **options)
+
+
+def _own_threads() -> set[int]:
+    """Numbers of this process's threads, where the system lists them."""
+    listing = Path("/proc/self/task")
+    return {int(entry.name) for entry in listing.iterdir()} if listing.is_dir() else set()
+
+
+def _give_each_a_core(started: list[int], threads: int | None) -> None:
+    """Let each of the kernels' threads run on a core of its own, where they have all cores.
+
+    Linux wakes a thread on the core of the one that wakes it: a kernel that is launched by a thread
+    that was busy until then has its workers wait for each other on one core, for milliseconds.
+
+    Args:
+        started: threads that Taichi has started, oldest first; the workers are the last of them.
+        threads: as `init` was asked.
+    """
+    if not hasattr(os, "sched_setaffinity"):
+        return
+    cores = sorted(os.sched_getaffinity(0))
+    workers = started[-len(cores) :]
+    if len(cores) < 2 or len(workers) < len(cores) or (threads or len(cores)) != len(cores):
+        return
+    for thread, core in zip(workers, cores, strict=True):
+        with contextlib.suppress(OSError):  # it may have ended, or the system forbid it
+            os.sched_setaffinity(thread, {core})
 
 
 def _shorten_first_compilation() -> None:

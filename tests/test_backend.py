@@ -288,3 +288,35 @@ def test_a_fresh_process_tells_what_its_start_took(tmp_path):
     assert tuple(seconds) == PARTS
     assert all(value >= 0 for value in seconds.values())
     assert list((tmp_path / "passpmp_ti" / "kernels").glob("*.tic"))
+
+
+@pytest.mark.skipif(
+    not hasattr(os, "sched_getaffinity") or len(os.sched_getaffinity(0)) < 2,
+    reason="the kernels' threads have cores of their own only where Linux has several to give",
+)
+def test_the_threads_that_work_have_a_core_each():
+    """In a process of its own: threads are given their cores as Taichi starts."""
+    told = """
+import os
+import numpy as np
+import passpmp_ti as pti
+from passpmp_ti.kernels.probe import add_up
+
+def spent(thread):
+    return int(open(f"/proc/self/task/{thread}/schedstat").read().split()[0])
+
+pti.init("cpu")
+whole, real = np.zeros(4_000_000, dtype=np.int32), np.zeros(4_000_000, dtype=np.float32)
+add_up(whole, real, real)
+threads = [int(t) for t in os.listdir("/proc/self/task")]
+before = {t: spent(t) for t in threads}
+for _ in range(20):
+    add_up(whole, real, real)
+busy = sorted(threads, key=lambda t: before[t] - spent(t))[: len(os.sched_getaffinity(0))]
+print(sorted(core for t in busy for core in os.sched_getaffinity(t)))
+print(sorted(os.sched_getaffinity(0)))
+"""
+    answer = subprocess.run([sys.executable, "-c", told], capture_output=True, text=True)
+    assert answer.returncode == 0, answer.stderr
+    worked, all_cores = answer.stdout.splitlines()
+    assert worked == all_cores
