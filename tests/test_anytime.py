@@ -10,9 +10,10 @@ import numpy as np
 import pytest
 from oracle import exact
 
-from passpmp_ti import DifferentialDrive, FutureModel, Navigator, Settings
+from passpmp_ti import CarLike, DifferentialDrive, FutureModel, Navigator, Settings
 from passpmp_ti.bench import anytime
 from passpmp_ti.bench.found import Options
+from passpmp_ti.kernels.tree import grow_level
 from passpmp_ti.planner import budget as budget_module
 from passpmp_ti.planner import rehearsal
 from passpmp_ti.planner.budget import DECAY, FACTOR, FIRST, LEAST, MOST, Budget, Reserve
@@ -295,3 +296,16 @@ def test_the_benchmark_counts_every_cycle():
     assert row["cycles"] == 3
     assert row["late"] == 0
     assert sum(found.details["ended by"].values()) == 3
+
+
+@pytest.mark.parametrize("robot", [CarLike(), DifferentialDrive()])
+def test_the_rehearsal_grows_trees_along_roads_and_without(robot, monkeypatch):
+    grown = set()
+
+    def watched(kind, by_roads, *rest):
+        grown.add(by_roads)
+        return grow_level(kind, by_roads, *rest)
+
+    monkeypatch.setattr("passpmp_ti.planner.tree.grow_level", watched)
+    rehearsal.rehearse(Navigator, robot, Settings.for_robot(robot))
+    assert grown == {True, False}

@@ -13,6 +13,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from passpmp_ti.grid.model import FutureModel
+from passpmp_ti.planner.guide import Guide
+from passpmp_ti.planner.tree import TreeGrower
 from passpmp_ti.robots import Robot
 from passpmp_ti.scan import Scan
 from passpmp_ti.settings import Settings
@@ -25,6 +28,10 @@ NODES = 200
 """Nodes of the tree that is rehearsed with."""
 ALMOST_STILL = 1e-3
 """Speed of objects [m/s]: everything is safe, so that there is a tree to choose from."""
+WIDE = 4000
+"""Nodes of the trees of which one is grown along roads: its levels have to be wide enough."""
+ALWAYS = 1e-9
+"""Nodes for each gait from which on roads are laid, where they always are."""
 ACROSS = 60
 """Cells from the robot to the wall about it."""
 
@@ -63,6 +70,23 @@ def rehearse(make: Callable[..., Navigator], robot: Robot, settings: Settings) -
             moving=np.arange(BEAMS) % 2 == 0,
         )
         held = navigator.update(scan, state)
+        if k == 0:
+            assert navigator.model is not None
+            _grow_both_ways(navigator.model, robot, quick, state)
         state = held.at(stamp + settings.cycle)
     gc.collect()
     gc.freeze()
+
+
+def _grow_both_ways(
+    model: FutureModel, robot: Robot, settings: Settings, state: np.ndarray
+) -> None:
+    """Grow a tree along roads and one without: which of them a drive needs, and when, nobody
+    knows."""
+    straight = settings.changed(guide="euclidean", capacity=WIDE)
+    window = model.window
+    guide = Guide(robot, straight, (0.0, 0.0), [(1.0, 0.0)], window.anchor, 1.0, None)
+    field = guide.field(model, (1.0, 0.0), np.zeros(2))
+    for worth in (ALWAYS, math.inf):
+        grower = TreeGrower(robot, straight, worth=worth)
+        grower.grow(model, field, state, model.stamp + settings.cycle, 0)

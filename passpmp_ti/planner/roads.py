@@ -27,7 +27,10 @@ roads themselves, the gaits are known."""
 class Roads:
     """Roads of one level of a tree after the other; arrays as in kernels/roads.py."""
 
-    def __init__(self, robot: Robot, capacity: int) -> None:
+    def __init__(self, robot: Robot, capacity: int, worth: float | None = None) -> None:
+        if worth is None:
+            worth = DEVICE_WORTH if device.resident() else WORTH
+        self._worth = worth
         most = GAITS * (len(robot.controls) + len(robot.braking))
         self.gait = device.empty((capacity,), np.int32)
         """[capacity] gait of each node that was grown along a road, or is to have children so."""
@@ -66,7 +69,7 @@ class Roads:
         self._gaits, self._ends = self._ends, self._gaits
         self._ending = 0
         nodes = min(last - first, likely)
-        worth = DEVICE_WORTH if device.resident() else WORTH
+        worth = self._worth
         if number == 0 and nodes >= max(FEWEST, worth) and last - first <= MOST:
             sort_gaits(
                 body.kind, body.numbers, pose, first, last, self._slots, self.gait, self._gaits,

@@ -207,11 +207,17 @@ def tree_bytes(capacity: int) -> int:
 class TreeGrower:
     """Grows trees; owns what is kept of children between their check and their place in a tree.
 
+    Args:
+        robot: that drives.
+        settings: levels and capacity.
+        worth: nodes of a level for each gait from which on it is grown along roads; None: as
+            measured (planner/roads.py).
+
     Raises:
         ValueError: a tree of `Settings.capacity` does not fit the memory where it would be grown.
     """
 
-    def __init__(self, robot: Robot, settings: Settings) -> None:
+    def __init__(self, robot: Robot, settings: Settings, *, worth: float | None = None) -> None:
         self._settings = settings
         fan = len(robot.controls)
         room, wanted = device.memory(), tree_bytes(settings.capacity)
@@ -231,7 +237,7 @@ class TreeGrower:
         self._child_proof = device.empty((self._chunk * fan,), np.int32)
         self._block = device.empty((self._blocks + 1,), np.int32)
         self._grown = device.empty((2,), np.int32)
-        self._roads = Roads(robot, settings.capacity)
+        self._roads = Roads(robot, settings.capacity, worth)
 
     def grow(
         self, model: FutureModel, guide: GuideField, root: np.ndarray, start: float, proof: int,
