@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import functools
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from passpmp_ti import device
 from passpmp_ti.grid.spans import span_begins
 from passpmp_ti.kernels.check import WAYS
 from passpmp_ti.kernels.spans import BEGIN, LEVELS, ROUNDING
@@ -21,11 +23,11 @@ class Body:
     """Constant arrays of one robot; see kernels/check.py for their layout."""
 
     kind: int
-    numbers: np.ndarray
+    numbers: device.Array
     counts: np.ndarray
     """[15] int32; the window's corner and size are filled in by `placed`."""
-    braking: np.ndarray
-    controls: np.ndarray
+    braking: device.Array
+    controls: device.Array
 
     @classmethod
     def of(cls, robot: Robot, settings: Settings) -> Body:
@@ -68,6 +70,21 @@ class Body:
         counts[:4] = (*corner, size, size)
         counts[BEGIN:] = span_begins(size)[:-1]
         return counts
+
+
+@functools.lru_cache(maxsize=16)
+def bodies(robot: Robot, settings: Settings, resident: bool) -> tuple[Body, Body]:
+    """A robot's arrays for NumPy, and where the kernels run: `resident` as `device.resident` tells.
+
+    They never change, so that a device is given them once.
+    """
+    host = Body.of(robot, settings)
+    if not resident:
+        return host, host
+    numbers, braking, controls = (
+        device.put(array) for array in (host.numbers, host.braking, host.controls)
+    )
+    return host, replace(host, numbers=numbers, braking=braking, controls=controls)
 
 
 def to_poses(states: np.ndarray, anchor: tuple[float, float]) -> np.ndarray:

@@ -10,7 +10,7 @@ import numpy as np
 
 from passpmp_ti import backend, device, door
 from passpmp_ti.grid.arrival import arrival, rasterised
-from passpmp_ti.grid.body import Body, to_poses
+from passpmp_ti.grid.body import Body, bodies, to_poses
 from passpmp_ti.grid.memory import check_previous
 from passpmp_ti.grid.spans import spans_of
 from passpmp_ti.grid.static_map import StaticMap
@@ -58,7 +58,10 @@ class FutureModel:
     views: Views
     broken_premises: np.ndarray
     """[n, 2] returns in space that the model before had proven free [m]."""
-    _body: Body = field(repr=False)
+    body: Body = field(init=False, repr=False)
+    """The robot in arrays, for NumPy."""
+    there: Body = field(init=False, repr=False)
+    """The same where the kernels run."""
     counts: device.Array = field(init=False, repr=False)
     """[15] int32 that the check's kernels read of the window and the robot."""
     _copies: dict[str, np.ndarray] = field(default_factory=dict, init=False, repr=False)
@@ -67,7 +70,10 @@ class FutureModel:
     """[F] uint32: least and greatest ticks over blocks of cells, see kernels/spans.py."""
 
     def __post_init__(self) -> None:
-        counts = device.put(self._body.placed(self.window.corner, self.window.size))
+        body, there = bodies(self.robot, self.settings, device.resident())
+        object.__setattr__(self, "body", body)
+        object.__setattr__(self, "there", there)
+        counts = device.put(body.placed(self.window.corner, self.window.size))
         object.__setattr__(self, "counts", counts)
         object.__setattr__(self, "spans", spans_of(self.ticks, counts, self.window.size))
 
@@ -130,10 +136,8 @@ class FutureModel:
         )
         seen, marks = rasterised(views, window, settings)
         base = math.floor(stamp / TICK + 1e-6)
-        same = previous is not None and previous.robot is robot and previous.settings is settings
-        body = previous.body if previous is not None and same else Body.of(robot, settings)
         ticks, marks, broken = arrival(views, seen, marks, window, base, robot, settings, previous)
-        return cls(robot, settings, window, stamp, base, ticks, seen, marks, views, broken, body)
+        return cls(robot, settings, window, stamp, base, ticks, seen, marks, views, broken)
 
     @property
     def origin(self) -> tuple[float, float]:
@@ -233,12 +237,12 @@ class FutureModel:
         proof = np.zeros(len(states), dtype=np.int32)
         if len(states):
             check_states(
-                self._body.kind,
+                self.there.kind,
                 self.ticks,
                 self.spans,
-                self._body.numbers,
+                self.there.numbers,
                 self.counts,
-                self._body.braking,
+                self.there.braking,
                 to_poses(states, self.window.anchor),
                 ticks,
                 proof,
@@ -259,7 +263,7 @@ class FutureModel:
         touched = np.zeros(len(states), dtype=np.int32)
         poses = to_poses(states, self.window.anchor)
         check_path(
-            self._body.kind, self.ticks, self._body.numbers, self.counts, poses,
+            self.there.kind, self.ticks, self.there.numbers, self.counts, poses,
             self.ticks_of(times), touched,
         )  # fmt: skip
         return touched == 1
@@ -285,11 +289,6 @@ class FutureModel:
             horizon = 2 * self.settings.cycle + self.robot.longest_braking
             count = math.ceil(horizon / self.settings.layer_length)
         return np.stack([self.layer(index) for index in range(count)])
-
-    @property
-    def body(self) -> Body:
-        """The robot as the kernels read it."""
-        return self._body
 
     def _on_host(self, name: str) -> np.ndarray:
         """One of the arrays, where NumPy reads it; brought there once."""

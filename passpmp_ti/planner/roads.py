@@ -64,7 +64,7 @@ class Roads:
         Returns:
             Whether they are; not where the gaits are too many for the nodes, or for the memory.
         """
-        body = model.body
+        body = model.there
         number, self.number = self._ending, 0
         self._gaits, self._ends = self._ends, self._gaits
         self._ending = 0

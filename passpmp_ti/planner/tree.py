@@ -195,7 +195,7 @@ def follow(model: FutureModel, pose: np.ndarray, parts: list[tuple[np.ndarray, i
     steps = np.array([s for _, s in parts], dtype=np.int32)
     if not parts:
         return pose[None].copy()
-    trace(model.body.kind, model.body.numbers, pose[None].copy(), controls, steps, path, length)
+    trace(model.there.kind, model.there.numbers, pose[None].copy(), controls, steps, path, length)
     return path[: length[0]]
 
 
@@ -254,7 +254,7 @@ class TreeGrower:
             until: on `time.perf_counter`'s clock [s]; no chunk of parents is begun that would
                 probably end later. None: no deadline.
         """
-        settings, body = self._settings, model.body
+        settings, body = self._settings, model.there
         began = time.perf_counter()
         if settings.exploration_time is not None:
             budget = began + settings.exploration_time
@@ -274,7 +274,7 @@ class TreeGrower:
         roads = self._roads
         roads.clear()
         level_begin, count, depth, stopped_by = ROOT, 1, 0, "depth"
-        pace, fan = 0.0, float(len(body.controls))
+        pace, fan = 0.0, float(len(model.body.controls))
         for steps in settings.levels:
             first, level_end, short = level_begin, count, 0
             # by the whole level before, however its chunks were: the choice is part of the tree

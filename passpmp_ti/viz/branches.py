@@ -31,6 +31,7 @@ class Branches:
 
     def through(self, tree: Tree, leaves: tuple[int, ...]) -> np.ndarray:
         """[m, points, 2] the p-safe primitives on the way from the root to any of `leaves`."""
+        tree = tree.on_host()
         on_the_way = np.zeros(tree.count, dtype=bool)
         for leaf in leaves:
             node = int(leaf)
@@ -42,6 +43,7 @@ class Branches:
 
 def branches_of(tree: Tree) -> Branches:
     """Trace every primitive of a tree, kept or rejected."""
+    tree = tree.on_host()
     body, link = tree.model.body, tree.link
     braked = link[:, WHAT] == BRAKED
     grown = np.flatnonzero(~braked & (link[:, PARENT] >= 0))
@@ -84,7 +86,7 @@ def _lines(tree: Tree, parents: np.ndarray, controls: np.ndarray, steps: np.ndar
     path = np.empty((count * rows, 7), dtype=np.float32)
     length = np.zeros(count, dtype=np.int32)
     trace(
-        model.body.kind, model.body.numbers, np.ascontiguousarray(tree.pose[parents]),
+        model.there.kind, model.there.numbers, np.ascontiguousarray(tree.pose[parents]),
         np.ascontiguousarray(controls, dtype=np.float32), steps.astype(np.int32), path, length,
     )  # fmt: skip
     share = np.linspace(0.0, 1.0, points)
