@@ -42,6 +42,8 @@ LEAST = 64
 """Parents of a chunk that is no larger than what room is left for: a launch costs as much."""
 DEVICE_CHUNK, DEVICE_BLOCKS, DEVICE_LEAST = 1 << 20, 1024, 1 << 14
 """The same on a device, where each thread checks one child."""
+LONGEST = 0.004
+"""[s] that a chunk may take where there is a deadline: the clock is looked at between chunks."""
 FILLED = 0.5
 """Share of the memory that a tree may fill: the rest is for the model, the swarm and others."""
 DEEPEST = 64
@@ -322,11 +324,14 @@ def _parents_for(room: int, fan: float) -> int:
 def _in_time(parents: int, left: float, pace: float) -> int:
     """How many of some parents can be grown in the time left [s], at `pace` seconds each; 0: none.
 
-    A third of the time is kept back, for what takes longer than the last ones did.
+    A third of the time is kept back, and no chunk is to take long, for what takes longer than the
+    last ones did.
     """
     if left <= 0:
         return 0
-    return parents if pace == 0.0 else min(parents, int(left / (1.5 * pace)))
+    if pace == 0.0:
+        return parents
+    return min(parents, int(left / (1.5 * pace)), max(int(LONGEST / pace), 1))
 
 
 def planted(
