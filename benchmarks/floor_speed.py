@@ -16,14 +16,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import cv2
 import numpy as np
 from scenarios import table_row
 
 import passpmp_ti as pti
 from passpmp_ti.bench.kept import kept
 from passpmp_ti.bench.machine import circumstances
-from passpmp_ti.viz.chart import COLOURS, Chart, Line, chart_page
+from passpmp_ti.viz.chart import COLOURS, Chart, Line, chart_page, write_png
 
 CYCLES = (2.4, 1.0, 0.4, 0.2, 0.1, 0.05)
 TIME_STEP = 0.01
@@ -161,7 +160,7 @@ def main() -> int:
     RESULT.write_text(
         json.dumps({"time_step": TIME_STEP, **circumstances(1), "rows": rows}, indent=1) + "\n"
     )
-    cv2.imwrite(str(PICTURE), plot(rows)[:, :, ::-1], [cv2.IMWRITE_PNG_COMPRESSION, 9])
+    write_png(PICTURE, plot(rows))
     return 0
 
 

@@ -29,6 +29,7 @@ from passpmp_ti.planner.tree import TreeGrower
 from passpmp_ti.settings import Settings
 from passpmp_ti.sim.episode import CycleInfo
 from passpmp_ti.sim.scenario import Scenario
+from passpmp_ti.viz.chart import COLOURS, Chart, Line, chart_page, write_png
 
 SIZES = (13, 40, 120, 400, 1_200, 4_000, 12_000, 40_000, 120_000, 400_000, 1_000_000)
 FILLED = 120_000
@@ -73,6 +74,10 @@ PRIMITIVES: dict[str, dict[str, tuple[float, ...]]] = {
 }
 """Durations after the first, which lasts one cycle [s]. The first of each robot is its default; all
 but the last come to the same length."""
+
+LEVELS = ("4 levels", "5 levels", "6 levels", "7 levels", "longer")
+"""Of both robots: `longer` is the last of each."""
+NODE_TICKS = [(10.0, "10"), (100.0, "100"), (1e3, "1e3"), (1e4, "1e4"), (1e5, "1e5"), (1e6, "1e6")]
 
 TRAPS = ("u_shape", "deep_u", "nested_u", "spiral")
 GUIDES = ("safe_time", "euclidean")
@@ -177,10 +182,11 @@ def plans(options: argparse.Namespace) -> None:
     rows = [
         row
         for course in COURSES
-        for levels in ("4 levels", "5 levels", "6 levels", "7 levels", "longer")
+        for levels in LEVELS
         for row in rows_of(found, course.scenario, levels)
     ]
     print(plan_table(rows))
+    write_png(PICTURES / "tree-size.png", plan_charts(rows))
     (RESULTS / "tree-size-plans.json").write_text(
         json.dumps({"sizes": SIZES, **circumstances(1), "rows": rows}, indent=1) + "\n"
     )
@@ -276,6 +282,50 @@ def plan_table(rows: list[dict[str, Any]]) -> str:
     return "\n".join(lines)
 
 
+def plan_charts(rows: list[dict[str, Any]]) -> np.ndarray:
+    """Above what plans cost more than the best one known, below what the swarm adds to that."""
+    charts = []
+    for title, field in (
+        ("best plan, excess [s]", "excess_mean"),
+        ("the swarm's on top [s]", "swarm_excess_mean"),
+    ):
+        for course in COURSES:
+            drawn = []
+            for colour, levels in zip(COLOURS, LEVELS[:-1], strict=False):
+                own = [r for r in rows if (r["scenario"], r["levels"]) == (course.scenario, levels)]
+                # beyond the size of whole trees nothing changes
+                cut = sum(r["cut"] > 0 for r in own)
+                points = [(float(r["capacity"]), r[field]) for r in own[: cut + 1]]
+                drawn.append(Line(label=levels, colour=colour, points=points))
+            most = 1.05 * max([0.01, *(y for line in drawn for _, y in line.points)])
+            charts.append(
+                Chart(
+                    title=f"{course.scenario}: {title}", x_label="nodes, at most", lines=drawn,
+                    x_ticks=NODE_TICKS, y_most=most,
+                )
+            )  # fmt: skip
+    return chart_page(charts, 3, (400, 340))
+
+
+def trap_charts(rows: list[dict[str, Any]]) -> np.ndarray:
+    """Escapes, and the time to the goal, of each trap with the default guide and the paper's."""
+    charts = []
+    ticks = [(10.0, "10"), *NODE_TICKS[1:-1]]
+    for trap in TRAPS:
+        drawn = []
+        for colour, guide in zip(COLOURS, GUIDES, strict=False):
+            own = [r for r in rows if (r["trap"], r["guide"]) == (trap, guide)]
+            points = [(float(r["capacity"]), 100 * r["escapes"] / r["runs"]) for r in own]
+            drawn.append(Line(label=f"guide {guide}", colour=colour, points=points))
+        charts.append(
+            Chart(
+                title=f"{trap}: goals reached [%]", x_label="nodes, at most", lines=drawn,
+                x_ticks=ticks, y_most=105.0,
+            )
+        )  # fmt: skip
+    return chart_page(charts, 2, (600, 300))
+
+
 def traps(options: argparse.Namespace) -> None:
     """Escapes and times to the goal by the size of the tree."""
     found: dict[tuple[str, str, int, str], list[dict[str, Any]]] = {}
@@ -320,6 +370,7 @@ def traps(options: argparse.Namespace) -> None:
                     }
                 )  # fmt: skip
     print(trap_table(rows))
+    write_png(PICTURES / "tree-size-traps.png", trap_charts(rows))
     (RESULTS / "tree-size-traps.json").write_text(
         json.dumps({**circumstances(1), "rows": rows}, indent=1) + "\n"
     )

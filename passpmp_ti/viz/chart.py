@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import cv2
 import numpy as np
@@ -76,6 +77,18 @@ def chart_page(charts: Sequence[Chart], columns: int, panel: tuple[int, int]) ->
         cv2.circle(page, (x + 17, y), 6, colour, -1, cv2.LINE_AA)
         text.draw(page, label, (x + 44, y + 6), palette.INK, SIZE)
     return page
+
+
+def write_png(path: Path, image: np.ndarray) -> None:
+    """Write [H, W, 3] uint8 (red, green, blue) as small as it goes.
+
+    Raises:
+        OSError: it cannot be written there.
+    """
+    done, data = cv2.imencode(".png", image[:, :, ::-1], [cv2.IMWRITE_PNG_COMPRESSION, 9])
+    assert done
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_bytes(data.tobytes())
 
 
 def y_ticks(most: float) -> list[float]:
