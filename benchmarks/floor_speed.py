@@ -134,6 +134,9 @@ def main() -> int:
     parser.add_argument("folder", type=Path, help="where each run's JSON is kept")
     parser.add_argument("--seeds", type=int, default=3)
     parser.add_argument("--only-plot", action="store_true", help="no new runs")
+    parser.add_argument(
+        "--case", action="append", choices=[case.key for case in CASES], help="new runs of it alone"
+    )
     options = parser.parse_args()
     pti.init("cpu", threads=1)
     began, done = time.monotonic(), 0
@@ -142,7 +145,8 @@ def main() -> int:
     for seed, case, cycle in jobs:
         name = f"{case.key}-{cycle:g}-{seed}"
         done += 1
-        if options.only_plot and not (options.folder / f"{name}.json").exists():
+        new = not options.only_plot and (not options.case or case.key in options.case)
+        if not new and not (options.folder / f"{name}.json").exists():
             continue
         asked = {"case": case.key, "cycle": cycle, "seed": seed, "time_step": TIME_STEP}
         row = kept(options.folder, name, asked, lambda c=case, t=cycle, s=seed: drive(c, t, s))

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import argparse
 import functools
+import itertools
 import json
 import statistics
 import sys
@@ -33,7 +34,7 @@ from passpmp_ti.viz.chart import COLOURS, Chart, Line, chart_page, write_png
 
 SIZES = (13, 40, 120, 400, 1_200, 4_000, 12_000, 40_000, 120_000, 400_000, 1_000_000)
 FILLED = 120_000
-"""Nodes of the trees from which the rules of filling are told."""
+"""Nodes of the trees from which the rules of filling are told, for sizes of a tenth at most."""
 SEARCHES = 5
 GIVEN_UP = 6.0
 """A robot that stood for this long in a trap is taken to stay [s]."""
@@ -117,7 +118,7 @@ def escape(trap: str, guide: str, capacity: int, levels: str, seed: int) -> dict
 def measured(situation: Situation, settings: Settings) -> dict[str, Any]:
     """Trees of every size from one situation, and what other rules would have filled them with."""
     whole = situation.grow(TreeGrower(situation.robot, settings.changed(capacity=FILLED)))
-    sizes = [size for size in SIZES if size <= FILLED]
+    sizes = [size for size in SIZES if size <= FILLED // 10]
     return {
         "here": situation.here,
         "sizes": by_size(situation, settings, SIZES, SEARCHES),
@@ -186,6 +187,9 @@ def plans(options: argparse.Namespace) -> None:
         for row in rows_of(found, course.scenario, levels)
     ]
     print(plan_table(rows))
+    print()
+    print(swarm_table(rows, "u_shape", LEVELS[:4]))
+    print(f"\n{rule_table(found)}\n\n{notes(found)}")
     write_png(PICTURES / "tree-size.png", plan_charts(rows))
     (RESULTS / "tree-size-plans.json").write_text(
         json.dumps({"sizes": SIZES, **circumstances(1), "rows": rows}, indent=1) + "\n"
@@ -247,7 +251,7 @@ def rows_of(found: Sequence[dict[str, Any]], scenario: str, levels: str) -> list
                         f["rules"][rule][k] - least[key(f)] for f, _ in at
                     )
                     for rule in RULES
-                    if size <= FILLED
+                    if size <= FILLED // 10
                 },
             }
         )  # fmt: skip
@@ -260,26 +264,95 @@ def key(found: dict[str, Any]) -> tuple[str, int, int]:
 
 
 def plan_table(rows: list[dict[str, Any]]) -> str:
-    """The rows as Markdown."""
-    lines = [
-        "| scenario | tree | capacity | nodes | depth | cut | excess, median / mean [s] | relative"
-        " cost | gain | tree, all leaves, swarm [ms] | swarm missed | swarm's excess, mean / 95 %"
-        " [s] | mean excess filled in order / spread / cheapest first [s] |",
-        "|---" * 13 + "|",
-    ]
-    for r in rows:
-        rules = " / ".join(
-            f"{r[f'{rule}_excess_mean']:.3f}" for rule in RULES if f"{rule}_excess_mean" in r
-        )
-        gain = "-" if r["gain"] is None else f"{r['gain']:.2f}"
-        lines.append(
-            f"| {r['scenario']} | {r['levels']} | {r['capacity']:,} | {r['nodes']:,.0f} |"
-            f" {r['depth']:g} | {r['cut']} / {r['situations']} | {r['excess']:.3f} /"
-            f" {r['excess_mean']:.3f} | {r['relative_cost']:.3f} | {gain} | {r['tree_ms']:.1f},"
-            f" {r['scan_ms']:.1f}, {r['search_ms']:.1f} | {r['swarm_missed']:.2f} |"
-            f" {r['swarm_excess_mean']:.4f} / {r['swarm_excess_p95']:.4f} | {rules} |"
-        )
+    """What plans cost more than the best one known: a line a size, a column a kind of tree."""
+    lines = [f"| scenario | nodes, at most | {' | '.join(LEVELS)} |", "|---" * 7 + "|"]
+    for course in COURSES:
+        for size in SIZES:
+            cells = []
+            for levels in LEVELS:
+                r = row_at(rows, course.scenario, levels, size)
+                whole = r is None or (r["cut"] == 0 and r["nodes"] < 0.5 * size)
+                cells.append("" if r is None or whole else f"{r['excess_mean']:.3f}")
+            if any(cells):
+                lines.append(f"| `{course.scenario}` | {size:,} | {' | '.join(cells)} |")
+        ends = [row_at(rows, course.scenario, levels, SIZES[-1]) for levels in LEVELS]
+        told = (f"{r['excess_mean']:.3f} ({r['nodes']:,.0f} nodes)" if r else "" for r in ends)
+        lines.append(f"| `{course.scenario}` | more | {' | '.join(told)} |")
     return "\n".join(lines)
+
+
+def swarm_table(rows: list[dict[str, Any]], scenario: str, kinds: Sequence[str]) -> str:
+    """The swarm beside a look at all leaves, and what each step takes: a line a size."""
+    lines = [
+        "| tree | nodes, at most | nodes | depth | cost, relative | tree [ms] | all leaves [ms] |"
+        " swarm [ms] | swarm missed [%] | swarm's excess, mean / 95 % [s] |",
+        "|---" * 10 + "|",
+    ]
+    for levels in kinds:
+        for size in SIZES:
+            r = row_at(rows, scenario, levels, size)
+            if r is None or (r["cut"] == 0 and r["nodes"] < 0.3 * size):
+                continue
+            lines.append(
+                f"| {levels} | {size:,} | {r['nodes']:,.0f} | {r['depth']:g} |"
+                f" {r['relative_cost']:.3f} | {r['tree_ms']:.1f} | {r['scan_ms']:.1f} |"
+                f" {r['search_ms']:.1f} | {100 * r['swarm_missed']:.0f} |"
+                f" {r['swarm_excess_mean']:.3f} / {r['swarm_excess_p95']:.3f} |"
+            )
+    return "\n".join(lines)
+
+
+def rule_table(found: Sequence[dict[str, Any]]) -> str:
+    """What other rules change in the trees that were cut, beside the order of the nodes."""
+    sizes = [size for size in SIZES if size <= FILLED // 10]
+    lines = [
+        "| rule | scenario | trees | mean change [s] | better by more than 1 ms | worse |"
+        " from / to [s] |",
+        "|---" * 7 + "|",
+    ]
+    for rule in RULES[1:]:
+        for course in COURSES:
+            changes = [
+                f["rules"][rule][k] - f["rules"]["order"][k]
+                for f in found
+                for k in range(len(sizes))
+                if f["scenario"] == course.scenario and not f["sizes"][k]["whole"]
+            ]
+            better, worse = (sum(s * c > 1e-3 for c in changes) for s in (-1, 1))
+            lines.append(
+                f"| {rule} | `{course.scenario}` | {len(changes)} | {np.mean(changes):+.4f} |"
+                f" {better} | {worse} | {min(changes):+.2f} / {max(changes):+.2f} |"
+            )
+    return "\n".join(lines)
+
+
+def notes(found: Sequence[dict[str, Any]]) -> str:
+    """How often a larger tree had a worse plan, and how often the swarm missed in small trees."""
+    steps = [
+        after["best"] - before["best"]
+        for f in found
+        for before, after in itertools.pairwise(f["sizes"])
+    ]
+    small = [
+        cost > row["best"] + 1e-6
+        for f in found
+        for row in f["sizes"]
+        for cost in row["swarm"]
+        if row["capacity"] <= 1_200
+    ]
+    return (
+        f"steps to a larger size: {len(steps)}, worse by more than 1 ms: "
+        f"{sum(s > 1e-3 for s in steps)}, by at most {max(steps):.3f} s\n"
+        f"searches in trees of at most 1,200: {len(small)}, missed: {sum(small)}"
+    )
+
+
+def row_at(
+    rows: list[dict[str, Any]], scenario: str, levels: str, size: int
+) -> dict[str, Any] | None:
+    """The row of a scenario, a kind of tree and a size."""
+    wanted = (scenario, levels, size)
+    return next((r for r in rows if (r["scenario"], r["levels"], r["capacity"]) == wanted), None)
 
 
 def plan_charts(rows: list[dict[str, Any]]) -> np.ndarray:
@@ -337,6 +410,8 @@ def traps(options: argparse.Namespace) -> None:
         for capacity, levels in TREES
         if guide == "safe_time" or capacity <= 20_000
     ]
+    # what takes longest comes last, so that a study that is stopped has the rest
+    jobs.sort(key=lambda job: job[3] > 20_000)
     began = time.monotonic()
     for done, (seed, guide, trap, capacity, levels) in enumerate(jobs, 1):
         name = f"{trap}-{guide}-{capacity}-{seed}"

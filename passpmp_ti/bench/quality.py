@@ -78,7 +78,8 @@ def filled_by(
     in the order of the rule (one of `RULES`). With `order` it is what `TreeGrower` makes.
 
     Args:
-        tree: larger than all of `sizes`, or whole.
+        tree: whole, or so large that no level is cut that follows one of `sizes`: with at most n
+            children a node, n + 1 times the size is enough.
         robot: whose tree it is.
         settings: of the objective.
         sizes: capacities.

@@ -92,7 +92,7 @@ def write_png(path: Path, image: np.ndarray) -> None:
 
 
 def y_ticks(most: float) -> list[float]:
-    """Four to eight even marks from 0 to `most`, at 1, 2 or 5 times a power of ten."""
+    """Five to eleven even marks from 0 to `most`, at 1, 2 or 5 times a power of ten."""
     if not (math.isfinite(most) and most > 0):
         raise ValueError(f"y_ticks needs a finite end above 0; got {most!r}")
     step = 10.0 ** math.floor(math.log10(most))
