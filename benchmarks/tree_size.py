@@ -11,6 +11,7 @@ import argparse
 import functools
 import itertools
 import json
+import math
 import statistics
 import sys
 import time
@@ -84,9 +85,11 @@ TRAPS = ("u_shape", "deep_u", "nested_u", "spiral")
 GUIDES = ("safe_time", "euclidean")
 TREES = (
     (13, "4 levels"), (40, "4 levels"), (240, "4 levels"), (1_200, "4 levels"),
-    (4_000, "4 levels"), (20_000, "5 levels"), (120_000, "6 levels"),
+    (4_000, "4 levels"), (1_200, "5 levels"), (20_000, "5 levels"), (120_000, "6 levels"),
 )  # fmt: skip
 """(capacity, primitives) of the trees that are driven with."""
+PAPERS_TREES = (*TREES[:5], TREES[6])
+"""Those of them that are driven with the paper's guide too."""
 
 
 class GivenUp(KeyboardInterrupt):
@@ -381,22 +384,32 @@ def plan_charts(rows: list[dict[str, Any]]) -> np.ndarray:
 
 
 def trap_charts(rows: list[dict[str, Any]]) -> np.ndarray:
-    """Escapes, and the time to the goal, of each trap with the default guide and the paper's."""
+    """Goals reached and times to the goal with the default guide."""
     charts = []
-    ticks = [(10.0, "10"), *NODE_TICKS[1:-1]]
-    for trap in TRAPS:
+    along = [tree for tree in TREES if tree != (1_200, "5 levels")]
+    for title in ("goals reached [%]", "time to goal, median [s]"):
         drawn = []
-        for colour, guide in zip(COLOURS, GUIDES, strict=False):
-            own = [r for r in rows if (r["trap"], r["guide"]) == (trap, guide)]
-            points = [(float(r["capacity"]), 100 * r["escapes"] / r["runs"]) for r in own]
-            drawn.append(Line(label=f"guide {guide}", colour=colour, points=points))
+        for colour, trap in zip(COLOURS, TRAPS, strict=False):
+            points, spread = [], []
+            for capacity, levels in along:
+                wanted = (trap, GUIDES[0], capacity, levels)
+                for r in rows:
+                    if (r["trap"], r["guide"], r["capacity"], r["levels"]) != wanted:
+                        continue
+                    timed, times = title.startswith("time"), r["times"] or [math.nan]
+                    share = 100 * r["escapes"] / r["runs"]
+                    middle = statistics.median(times)
+                    points.append((float(capacity), middle if timed else share))
+                    spread.append((times[0], times[-1]) if timed else (math.nan, math.nan))
+            drawn.append(Line(label=trap, colour=colour, points=points, spread=spread))
+        tops = [y for line in drawn for _, y in (*line.points, *line.spread) if math.isfinite(y)]
         charts.append(
             Chart(
-                title=f"{trap}: goals reached [%]", x_label="nodes, at most", lines=drawn,
-                x_ticks=ticks, y_most=105.0,
+                title=title, x_label="nodes, at most", lines=drawn,
+                x_ticks=[*NODE_TICKS[:-1], (2e5, "")], y_most=1.05 * max([*tops, 1.0]),
             )
         )  # fmt: skip
-    return chart_page(charts, 2, (600, 300))
+    return chart_page(charts, 2, (600, 380))
 
 
 def traps(options: argparse.Namespace) -> None:
@@ -408,13 +421,13 @@ def traps(options: argparse.Namespace) -> None:
         for guide in GUIDES
         for trap in TRAPS
         for capacity, levels in TREES
-        if guide == "safe_time" or capacity <= 20_000
+        if guide == "safe_time" or (capacity, levels) in PAPERS_TREES
     ]
     # what takes longest comes last, so that a study that is stopped has the rest
     jobs.sort(key=lambda job: job[3] > 20_000)
     began = time.monotonic()
     for done, (seed, guide, trap, capacity, levels) in enumerate(jobs, 1):
-        name = f"{trap}-{guide}-{capacity}-{seed}"
+        name = f"{trap}-{guide}-{capacity}-{levels[0]}-{seed}"
         if options.only_plot and not (options.folder / f"{name}.json").exists():
             continue
         asked = {
@@ -453,26 +466,20 @@ def traps(options: argparse.Namespace) -> None:
 
 def trap_table(rows: list[dict[str, Any]]) -> str:
     """One line a trap and guide, one column a tree: escapes, and the median time to the goal."""
-    heads = [f"{capacity:,}" for capacity, _ in TREES]
+    heads = [f"{capacity:,}, {levels}" for capacity, levels in TREES]
     lines = [f"| trap | guide | {' | '.join(heads)} |", "|---" * (2 + len(heads)) + "|"]
+    cells = {(r["guide"], r["trap"], r["capacity"], r["levels"]): r for r in rows}
     for guide in GUIDES:
         for trap in TRAPS:
-            cells = []
-            for capacity, _ in TREES:
-                own = [
-                    r for r in rows
-                    if (r["trap"], r["guide"], r["capacity"]) == (trap, guide, capacity)
-                ]  # fmt: skip
-                cell = "-"
-                if own:
-                    r = own[0]
-                    took = "" if r["time_median"] is None else f", {r['time_median']:.1f} s"
-                    cell = f"{r['escapes']} / {r['runs']}{took}"
-                cells.append(cell)
-            lines.append(f"| `{trap}` | {guide} | {' | '.join(cells)} |")
-    contacts = sum(r["contacts_moving"] for r in rows)
+            told = []
+            for tree in TREES:
+                r = cells.get((guide, trap, *tree))
+                took = f", {r['time_median']:.1f} s" if r and r["escapes"] else ""
+                told.append(f"{r['escapes']} / {r['runs']}{took}" if r else "")
+            lines.append(f"| `{trap}` | `{guide}` | {' | '.join(told)} |")
+    runs, contacts = (sum(r[field] for r in rows) for field in ("runs", "contacts_moving"))
     metres = sum(r["metres"] for r in rows)
-    lines.append(f"\ncontacts while moving: {contacts}, metres driven: {metres:.0f}")
+    lines.append(f"\n{runs} runs, {metres:.0f} m, contacts while moving: {contacts}")
     return "\n".join(lines)
 
 
