@@ -206,7 +206,7 @@ def rows_of(found: Sequence[dict[str, Any]], scenario: str, levels: str) -> list
         f for f in found
         if f["scenario"] == scenario and ("," in f["levels"] if longer else f["levels"] == levels)
     ]  # fmt: skip
-    least = {key(f): f["sizes"][-1]["best"] for f in own}
+    least = {key(f): min(row["best"] for row in f["sizes"]) for f in own}
     if not longer:
         # all trees of one length are measured by the best plan of any of them
         for f in found:
@@ -428,7 +428,8 @@ def traps(options: argparse.Namespace) -> None:
     began = time.monotonic()
     for done, (seed, guide, trap, capacity, levels) in enumerate(jobs, 1):
         name = f"{trap}-{guide}-{capacity}-{levels[0]}-{seed}"
-        if options.only_plot and not (options.folder / f"{name}.json").exists():
+        new = not options.only_plot and options.guide in (None, guide)
+        if not new and not (options.folder / f"{name}.json").exists():
             continue
         asked = {
             "trap": trap, "guide": guide, "capacity": capacity, "levels": levels, "seed": seed,
@@ -489,6 +490,7 @@ def main() -> int:
     parser.add_argument("folder", type=Path, help="where each run's JSON is kept")
     parser.add_argument("--seeds", type=int, help="drives; 1 for plans, 3 for traps")
     parser.add_argument("--situations", type=int, default=12, help="taken of each drive")
+    parser.add_argument("--guide", choices=GUIDES, help="traps: new runs with it alone")
     parser.add_argument("--only-plot", action="store_true", help="no new runs")
     options = parser.parse_args()
     options.seeds = options.seeds or {"plans": 1, "traps": 3}[options.what]
