@@ -11,10 +11,13 @@ SHIPPED = [
     "corridor_person",
     "crowded",
     "dead_end",
+    "deep_u",
     "eth",
     "eth_stream",
     "narrow_passage",
+    "nested_u",
     "simple",
+    "spiral",
     "u_shape",
 ]
 
