@@ -301,11 +301,11 @@ def proving_brake(
         if numbers[22] > 0.0:
             # while it is still moving for sure
             last = ti.cast(ti.abs(q[A]) / (numbers[22] * numbers[1]), ti.i32) - 1
-            for share in ti.static((4, 2, 1)):
-                m = last // share
-                if b == 0 and m > 0:
-                    if doomed(spans, numbers, counts, robot, q, tick, m):
-                        b = counts[6]
+            # soon enough for the disc to be small, late enough to be where it matters
+            m = last // 3
+            if m > 0:
+                if doomed(spans, numbers, counts, robot, q, tick, m):
+                    b = counts[6]
     while b < counts[6] and proof == 0:
         control = control_of(braking, b)
         if brakes_clear(kind, arrival, spans, numbers, counts, robot, q, tick, control):

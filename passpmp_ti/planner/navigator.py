@@ -84,6 +84,7 @@ class Navigator:
         self._laid = False  # whether what is held was verified by memory that had to be dropped
         self._modelled = False  # whether there ever was a model
         self._generator = np.random.default_rng(seed)
+        self._under_way = settings.changed(clear_radius=0.0)
         self._grower = TreeGrower(robot, settings)
         self._swarm = Swarm(robot, settings) if settings.optimizer == "pso" else None
         self._guide: Guide | None = None
@@ -225,7 +226,7 @@ class Navigator:
         assert heard.state is not None
         x, y, theta = (float(v) for v in heard.state[:3])
         at_the_start = heard.stamp == self._started and not lost
-        settings = self.settings if at_the_start else self.settings.changed(clear_radius=0.0)
+        settings = self.settings if at_the_start else self._under_way
         return FutureModel.from_scan(
             heard.scans, self.robot, settings, self.model, None if lost else self.static_map,
             position=(x, y, theta),
