@@ -89,8 +89,9 @@ def _children(arrival, scale, parents, controls, steps, step, ends, safe):
 
 def set_threads(count: int | None) -> None:
     """Let the loops use `count` threads; None: all."""
-    numba.set_num_threads(min(count or numba.config.NUMBA_NUM_THREADS,
-                              numba.config.NUMBA_NUM_THREADS))  # fmt: skip
+    # named at run time: a type checker that sees Numba does not see this
+    most = vars(numba.config)["NUMBA_NUM_THREADS"]
+    numba.set_num_threads(min(count or most, most))
 
 
 def passively_safe(arrival: np.ndarray, cell: float, states: States, step: float) -> np.ndarray:
