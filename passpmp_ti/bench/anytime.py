@@ -9,10 +9,11 @@ from typing import Any
 
 import numpy as np
 
+from passpmp_ti.bench import episodes
 from passpmp_ti.bench.cycle import LONG
+from passpmp_ti.bench.episodes import EnoughError
 from passpmp_ti.bench.found import Found, Options
 from passpmp_ti.planner.navigator import Navigator
-from passpmp_ti.sim.episode import simulate
 from passpmp_ti.sim.scenario import Scenario, load_scenario
 from passpmp_ti.trajectory import Trajectory
 
@@ -21,10 +22,6 @@ DEADLINE = 0.05
 """[s]"""
 CAPACITY = 200_000
 """Nodes: more than any cycle has the time for."""
-
-
-class _EnoughError(Exception):
-    """Ends an episode from within."""
 
 
 @dataclass
@@ -63,7 +60,7 @@ class _Watch:
         if len(self.seconds) % 500 == 0:
             self.see(f"anytime: {len(self.seconds)} of {self.wanted} cycles")
         if len(self.seconds) >= self.wanted:
-            raise _EnoughError
+            raise EnoughError
 
 
 def measure(options: Options) -> Found:
@@ -138,11 +135,7 @@ def hurried(scenario: Scenario, deadline: float) -> Scenario:
 def drive(scenario: Scenario, cycles: int, options: Options) -> _Watch:
     """Episodes, seed after seed, until there were enough cycles."""
     watch = _Watch(cycles, options.see)
-    seed = options.seed
-    while len(watch.seconds) < cycles:
-        try:
-            simulate(scenario, seed=seed, planner=watch.navigator)
-        except _EnoughError:
-            break
-        seed += 1
+    episodes.drive(
+        scenario, options.seed, lambda: len(watch.seconds) >= cycles, planner=watch.navigator
+    )
     return watch

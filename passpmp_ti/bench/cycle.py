@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from passpmp_ti import backend, door
-from passpmp_ti.bench import reference
+from passpmp_ti.bench import episodes, reference
+from passpmp_ti.bench.episodes import EnoughError
 from passpmp_ti.bench.found import Found, Options
 from passpmp_ti.bench.machine import machine
 from passpmp_ti.bench.scenes import car_scene
-from passpmp_ti.sim.episode import simulate
 from passpmp_ti.sim.scenario import Scenario, load_scenario
 
 if TYPE_CHECKING:
@@ -30,10 +30,6 @@ LONG = (0.4,) * 7
 """Primitives that make a tree of ten thousand nodes [s]."""
 YARDSTICK_EVERY = 25
 """Cycles between two looks at how fast the machine is just now."""
-
-
-class _EnoughError(Exception):
-    """Ends an episode from within."""
 
 
 class _Stopwatch:
@@ -53,7 +49,7 @@ class _Stopwatch:
         self.timings.append(record.timings)
         self.nodes.append(record.tree_nodes)
         if len(self.timings) >= self.wanted:
-            raise _EnoughError
+            raise EnoughError
 
 
 def measure(options: Options) -> Found:
@@ -122,13 +118,9 @@ def measure_cycle(scenario: Scenario, cycles: int = CYCLES, seed: int = 0) -> di
     first = door.whole("measure_cycle", "seed", seed, least=0)
     arch = backend.init()
     watch = _Stopwatch(WARM_UP, cycles)
-    last = first
-    while len(watch.timings) < cycles:
-        try:
-            simulate(scenario, seed=last, on_cycle=watch.see)
-        except _EnoughError:
-            break
-        last += 1
+    last = episodes.drive(
+        scenario, first, lambda: len(watch.timings) >= cycles, on_cycle=watch.see
+    )
     parts = dict.fromkeys(name for timing in watch.timings for name in timing)
     seconds = {
         name: _spread(np.array([timing.get(name, 0.0) for timing in watch.timings]))

@@ -10,8 +10,9 @@ widest. Both lean to the unsafe side.
 
 Most looks need not be taken: `spans` (kernels/spans.py) tells at once until when all of a disc is
 free, and from when on none of it is. While the robot stays inside a free disc no look could find
-anything; when every braking has to pass through one that is not, some look of each would. The
-answers are those of all the looks.
+anything; when every braking has to pass through one that is not, some look of each would. So far
+the answers are those of all the looks. `runs_into` gives up on less than that: it may call a state
+unsafe that all looks would find safe, never the other way.
 
 Shared parameters:
     numbers f32: 0 cells a metre, 1 time step [s], 2-7 robot (kernels/motion.py), 8-15 disc offsets,
@@ -56,8 +57,11 @@ Arrival = ti.types.ndarray(dtype=ti.u16, ndim=2)
 Table = ti.types.ndarray(dtype=ti.f32, ndim=2)
 NEVER, LATEST = 65535, 65534
 STRIDES = 6
+"""Long steps in which a braking is followed to see what it runs into."""
 WIDE = 0
+"""Level of the places that are asked about there: wide enough for the errors of such steps."""
 PAUSE = -2
+"""Less than zero: steps whose looks are taken before spans are asked again."""
 WAYS = 24
 """Where the ways of the levels of `spans` begin in `numbers`."""
 
@@ -213,11 +217,7 @@ def runs_into(
     met = False
     k = stride
     while k <= steps and not met:
-        a, b = braked(kind, q, control, dt)
-        steering, half_curvature = steered(kind, robot, q[B], control, dt)
-        if ti.static(kind == CAR):
-            b = steering
-        q = moved(kind, robot, q, a, b, half_curvature, dt)
+        q = step(kind, robot, q, control, 0.0, dt)
         tick += stride * counts[4]
         x = q[X] + numbers[8] * q[C]
         y = q[Y] + numbers[8] * q[S]
@@ -320,8 +320,8 @@ def check_states(
     kind: ti.template(),
     arrival: Arrival,  # [J, I]
     spans: Spans,  # [F]
-    numbers: Numbers,  # [20]
-    counts: Counts,  # [14]
+    numbers: Numbers,  # [38]
+    counts: Counts,  # [15]
     braking: Table,  # [B, 3]
     poses: Table,  # [N, 7]
     ticks: Counts,  # [N]
@@ -343,8 +343,8 @@ def check_path(
     # in
     kind: ti.template(),
     arrival: Arrival,  # [J, I]
-    numbers: Numbers,  # [20]
-    counts: Counts,  # [14]
+    numbers: Numbers,  # [38]
+    counts: Counts,  # [15]
     poses: Table,  # [N, 7], at most a time step apart
     ticks: Counts,  # [N]
     # out
@@ -371,7 +371,7 @@ def check_path(
 def trace(
     # in
     kind: ti.template(),
-    numbers: Numbers,  # [20]
+    numbers: Numbers,  # [38]
     start: Table,  # [N, 7]
     controls: Table,  # [N, M, 3] flattened to [N * M, 3]
     steps: Counts,  # [N * M]: steps of each control in turn; -1: until at rest

@@ -37,7 +37,6 @@ LEAF, USED = range(2)
 EMPTY = -1
 VELOCITY_MAX, COGNITIVE, SOCIAL = range(TICK_LENGTH + 1, TICK_LENGTH + 4)
 """What the swarm is told, after what `plan_cost` is: V_pmax, w_c, w_s."""
-SHARE = 512  # indices of a loop that one thread of a CPU takes at a time, however few there are
 TURNS = 4  # iterations in one launch of `search_together`
 
 
@@ -256,6 +255,7 @@ def forget(row, mask, keys: ti.template(), ends: ti.template(), least: ti.templa
 @kernel
 def search(
     # in
+    share: ti.template(),  # indices that one thread is handed at a time, see device.share
     seed: ti.u32,
     iterations: ti.i32,
     particles: ti.i32,  # P
@@ -275,11 +275,11 @@ def search(
 ):
     """Algorithm 3 on the threads of a CPU: sub-swarms run in parallel and do not see each other,
     so that no iteration waits for another thread, and the whole search is one launch."""
-    for i in range(groups * SHARE):
-        if i % SHARE == 0:
+    for i in range(groups * share):
+        if i % share == 0:
             mask = mask_for(slots, count, link)
-            group = particles + i // SHARE
-            first = i // SHARE * (particles // groups)
+            group = particles + i // share
+            first = i // share * (particles // groups)
             last = first + particles // groups
             forget(group, mask, keys, ends, least)
             for p in range(first, last):

@@ -83,7 +83,7 @@ class Swarm:
             for begin in range(0, settings.iterations + 1, TURNS):
                 search_together(begin, *task)
         else:
-            search(*task)
+            search(device.share(), *task)
         end, least = device.host(self._ends)[:, LEAF], device.host(self._least)
         # sub-swarms share their best at the end; ties go to the lowest index
         winner = settings.particles + int(np.argmin(least[settings.particles :]))
