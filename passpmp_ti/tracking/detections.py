@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from passpmp_ti.settings import Settings
-from passpmp_ti.tracking.segments import Segments, longest, segments_of
+from passpmp_ti.tracking.segments import longest, segments_of
 from passpmp_ti.tracking.sighting import Sighting
 
 SHAPE_ERROR = 0.1
@@ -112,7 +112,9 @@ def detect(sightings: Sequence[Sighting], settings: Settings) -> Detections:
     halves = [0.5 * (p.span + s.increment) for p, s in zip(parts, sightings, strict=True)]
     found = Detections(
         group=np.arange(base[-1]),
-        origin=_joined([np.tile(s.origin, (m, 1)) for s, m in zip(sightings, sides, strict=True)], 2),
+        origin=_joined(
+            [np.tile(s.origin, (m, 1)) for s, m in zip(sightings, sides, strict=True)], 2
+        ),
         first=_joined([p.first - 0.5 * s.increment for p, s in zip(parts, sightings, strict=True)]),
         half=_joined(halves),
         nearest=_joined([p.nearest for p in parts]),

@@ -1,4 +1,4 @@
-"""The interacting multiple model over all tracks at once: what filterpy's IMMEstimator does for one.
+"""The interacting multiple model over all tracks at once, as filterpy's IMMEstimator does for one.
 
 filterpy's estimator takes about a millisecond a track and step in Python. Here its equations run
 over arrays of tracks, with the matrices of filterpy's filters; the tests hold the two together.
@@ -54,7 +54,8 @@ def born(centre: np.ndarray, deviation: np.ndarray, speed: float) -> Bank:
     """Tracks of what was just met.
 
     Nothing is known of the velocity but its bound v_b: a velocity anywhere in the disc of radius
-    v_b has a standard deviation of v_b / 2 along each axis. In the mode "still" it is the mode's own.
+    v_b has a standard deviation of v_b / 2 along each axis. In the mode "still" it is the mode's
+    own.
 
     Args:
         centre: [N, 2] [m].
