@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,9 +15,11 @@ from passpmp_ti.grid.body import Body, bodies, to_poses
 from passpmp_ti.grid.memory import check_previous
 from passpmp_ti.grid.spans import spans_of
 from passpmp_ti.grid.static_map import StaticMap
-from passpmp_ti.grid.view import Views, views_of
+from passpmp_ti.grid.tubes import NO_TUBES, layer_times, overlaid, tubes_of
+from passpmp_ti.grid.view import Labels, Views, labels_of, views_of
 from passpmp_ti.grid.window import Window, size_for
 from passpmp_ti.kernels.arrival import NEVER
+from passpmp_ti.kernels.beams import LOST, MOVABLE
 from passpmp_ti.kernels.check import check_path, check_states
 from passpmp_ti.kernels.visibility import (
     BLIND_SOURCES,
@@ -28,6 +31,9 @@ from passpmp_ti.kernels.visibility import (
 from passpmp_ti.robots import Robot
 from passpmp_ti.scan import Scan
 from passpmp_ti.settings import Settings
+
+if TYPE_CHECKING:
+    from passpmp_ti.tracking.tracks import Tracks
 
 TICK = 1e-3
 """[s]"""
@@ -58,6 +64,11 @@ class FutureModel:
     views: Views
     broken_premises: np.ndarray
     """[n, 2] returns in space that the model before had proven free [m]."""
+    hidden_ticks: device.Array = None
+    """[J, I] uint16 [ms], as `ticks`: when something hidden or not tracked could come, at the bound
+    of speed. What the next model remembers. `ticks` themselves in conservative mode."""
+    tracks: Tracks | None = None
+    """The movers that are tracked; None in conservative mode."""
     body: Body = field(init=False, repr=False)
     """The robot in arrays, for NumPy."""
     there: Body = field(init=False, repr=False)
@@ -70,6 +81,8 @@ class FutureModel:
     """[F] uint32: least and greatest ticks over blocks of cells, see kernels/spans.py."""
 
     def __post_init__(self) -> None:
+        if self.hidden_ticks is None:
+            object.__setattr__(self, "hidden_ticks", self.ticks)
         body, there = bodies(self.robot, self.settings, device.resident())
         object.__setattr__(self, "body", body)
         object.__setattr__(self, "there", there)
@@ -126,18 +139,39 @@ class FutureModel:
             window.inner_radius - math.hypot(s.pose[0] - position[0], s.pose[1] - position[1])
             for s in scans
         ]
+        labels = labels_of(scans, settings, window.anchor, reach_of, static_map)
+        tracks = _followed(labels, window, previous, settings, stamp) if settings.tracks else None
         views = views_of(
-            scans,
+            labels,
             _empty_discs(robot, settings, position, window, previous is None),
             settings,
             window.anchor,
-            reach_of,
             static_map,
+            None if tracks is None else [owner >= 0 for owner in tracks.owner],
         )
         seen, marks = rasterised(views, window, settings)
         base = math.floor(stamp / TICK + 1e-6)
-        ticks, marks, broken = arrival(views, seen, marks, window, base, robot, settings, previous)
-        return cls(robot, settings, window, stamp, base, ticks, seen, marks, views, broken)
+        # memory has no cones for movers that were tracked: one that is lost may be anywhere
+        memory = None if tracks is not None and tracks.ended else previous
+        hidden, marks, broken = arrival(views, seen, marks, window, base, robot, settings, memory)
+        if tracks is None:
+            return cls(robot, settings, window, stamp, base, hidden, seen, marks, views, broken)
+        forecast = tracks.forecast(layer_times(settings, robot, stamp))
+        tubes = NO_TUBES[:0]
+        if settings.mode == "hybrid":
+            tubes = tubes_of(tracks, forecast, robot, settings, window, base * TICK)
+        unexplained = np.concatenate(
+            [
+                views.points(v, window.anchor)[(labels.met[v] == MOVABLE) & (owner < 0)]
+                for v, owner in enumerate(tracks.owner)
+            ]
+        )
+        ticks = overlaid(
+            hidden, tubes, unexplained, window, base * TICK, stamp, robot, settings
+        )
+        return cls(
+            robot, settings, window, stamp, base, ticks, seen, marks, views, broken, hidden, tracks
+        )
 
     @property
     def origin(self) -> tuple[float, float]:
@@ -341,6 +375,41 @@ def _window_for(
         size = size_for(furthest, settings.cell)
     anchor = previous.window.anchor if previous is not None else None
     return Window.around(position[0], position[1], size, settings.cell, anchor)
+
+
+def _followed(
+    labels: Labels,
+    window: Window,
+    previous: FutureModel | None,
+    settings: Settings,
+    stamp: float,
+) -> Tracks:
+    """The tracks of the model before, carried on by what the scans saw."""
+    try:
+        # filterpy and SciPy take longer to load than the rest of the planner
+        from passpmp_ti.tracking.pursuit import follow
+        from passpmp_ti.tracking.sighting import Sighting
+    except ImportError as missing:
+        raise ValueError(
+            f'Settings.mode = "{settings.mode}" needs tracks, and {missing.name} is not installed:'
+            f' pip install {missing.name}, or take mode="conservative"'
+        ) from missing
+    seen = []
+    for v, scan in enumerate(labels.scans):
+        bearing = scan.pose[2] + scan.angle_min
+        seen.append(
+            Sighting(
+                origin=scan.pose[:2],
+                bearings=bearing + scan.angle_increment * np.arange(len(scan.ranges)),
+                ranges=labels.ranges[v].astype(np.float64),
+                movable=labels.met[v] == MOVABLE,
+                lost=labels.met[v] == LOST,
+                increment=scan.angle_increment,
+                closed=labels.closed[v],
+                range_max=float(labels.view[v, 5]),
+            )
+        )
+    return follow(None if previous is None else previous.tracks, seen, stamp, settings)
 
 
 def _empty_discs(

@@ -5,8 +5,9 @@ Nodes are rows of flat arrays, parents before children, siblings side by side.
     pose [cap, 7] f32: see kernels/motion.py
     link [cap, 8] i32: 0 parent, 1 control, 2 steps of the primitive, 3 tick, 4 braking control
         that proves the node, 5 first child, 6 number of children, 7 what the node is
-    cost [cap, 5] f32: 0 integral of the guide along the plan to the node, 1 guide at the node,
-        2 integral along the braking that proves the node, 3 guide at its end, 4 its duration [s]
+    cost [cap, 6] f32: 0 integral of the guide along the plan to the node, 1 guide at the node,
+        2 integral along the braking that proves the node, 3 guide at its end, 4 its duration [s],
+        5 w_ps of the plan that ends here (eqs. 8 and 9): 1 where no risk is taken
 
 A level of few gaits for its nodes is grown along roads (kernels/roads.py), any other one by
 integrating from each node.
@@ -336,6 +337,7 @@ def grow_level(
                             cost[at, 2] = after
                             cost[at, 3] = at_rest_cost
                             cost[at, 4] = seconds
+                            cost[at, 5] = 1.0
                             at += 1
                 elif fits:
                     store_braking(
@@ -388,6 +390,7 @@ def store_braking(
     cost[at, 2] = 0.0
     cost[at, 3] = there
     cost[at, 4] = 0.0
+    cost[at, 5] = cost[parent, 5]  # the same motion as the parent's own plan
 
 
 @kernel
@@ -417,7 +420,7 @@ def plant(
     # in
     root_pose: Numbers,  # [7]
     root_link: Counts,  # [8]
-    root_cost: Numbers,  # [5]
+    root_cost: Numbers,  # [6]
     # out
     pose: Table,
     link: Links,
@@ -430,5 +433,5 @@ def plant(
             pose[0, r] = root_pose[r]
         for r in ti.static(range(8)):
             link[0, r] = root_link[r]
-        for r in ti.static(range(5)):
+        for r in ti.static(range(6)):
             cost[0, r] = root_cost[r]

@@ -21,7 +21,8 @@ class CycleRecord:
     """t_k [s]."""
     decision: str
     """"new": a plan of this cycle's tree; "held": the remainder of the plan held; "brake": braking
-    at once, after a broken premise or off its plan; "arrived": at rest at the last goal."""
+    at once, after a broken premise, off its plan, or where a track made what is held too risky and
+    nothing better was found; "arrived": at rest at the last goal."""
     reason: str = ""
     """Why the plan is not a new one; empty where it is."""
     timings: dict[str, float] = field(default_factory=dict)
@@ -43,13 +44,20 @@ class CycleRecord:
     """Duration of the chosen trajectory, to rest [s]."""
     decision_time: float = float("inf")
     """delta_d of eq. 20 [s]: from t_k until the held motion, kept on, could no longer be braked."""
+    risk: float = 0.0
+    """Promised: greatest chance that the chosen trajectory, followed to rest, touches something
+    while the robot moves. 0 in conservative mode; "hybrid": that some tracked mover is not where it
+    should be; "probabilistic": by eqs. 11 and 12, see docs/risk.md."""
+    held_risk: float = 0.0
+    """The same of what was held, as this cycle sees it."""
     root_proved: bool = True
     """Whether a fresh check of s_{k+1} finds a braking control that proves it. In the middle of a
     primitive none needs to: what is held ends at rest another way, see `held_clear`."""
     held_clear: bool = True
     """Whether what was held, judged by this cycle's model at its own sample times, is still free
-    to its end: the certificate. Only a broken premise may make it False. True where it was not
-    asked: without a scan, or off the plan, where memory's coordinates mean nothing."""
+    to its end: the certificate. In conservative mode only a broken premise may make it False; in
+    the others a track that turns out differently may as well. True where it was not asked: without
+    a scan, or off the plan, where memory's coordinates mean nothing."""
     broken_premises: np.ndarray = field(default_factory=lambda: np.zeros((0, 2)))
     """[n, 2] places [m] where a return stood in space proven free."""
     lost_scan: str = ""

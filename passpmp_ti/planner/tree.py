@@ -64,7 +64,7 @@ class Tree:
     link: device.Array
     """[n, 8] int32, see kernels/tree.py."""
     cost: device.Array
-    """[n, 5] float32: the guide along the plan, at the node, and along its braking; see there."""
+    """[n, 6] float32: the guide along the plan, at the node, and along its braking; see there."""
     root: np.ndarray
     """[7] float32 pose of the root."""
     count: int
@@ -203,7 +203,7 @@ def follow(model: FutureModel, pose: np.ndarray, parts: list[tuple[np.ndarray, i
 
 def tree_bytes(capacity: int) -> int:
     """What a tree of `capacity` nodes takes, and the gaits of its nodes [bytes]."""
-    return capacity * 4 * (7 + 8 + 5 + 1)
+    return capacity * 4 * (7 + 8 + 6 + 1)
 
 
 class TreeGrower:
@@ -267,7 +267,7 @@ class TreeGrower:
             settings.capacity,
             root_pose,
             np.array([NO_PARENT, 0, 0, model.ticks_of(start), proof, -1, 0, 0], dtype=np.int32),
-            np.array([0.0, here, 0.0, here, 0.0], dtype=np.float32),
+            np.array([0.0, here, 0.0, here, 0.0, 1.0], dtype=np.float32),
         )
         fixed = (
             model.ticks, model.spans, guide.time, guide.ahead, guide.frame, body.numbers,
