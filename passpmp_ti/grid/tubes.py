@@ -24,7 +24,7 @@ TICK = 1e-3
 """[s]"""
 SLACK = 1e-3
 """[m] by which f32 places and forms may be short."""
-NO_TUBES = np.zeros((1, 9), dtype=np.float32)
+NO_TUBES = np.zeros((1, 12), dtype=np.float32)
 
 
 def last_braking_ends(settings: Settings, robot: Robot) -> float:
@@ -91,7 +91,7 @@ def tubes_of(
         base: from which ticks count [s].
 
     Returns:
-        [K, 9] float32, in order of time.
+        [K, 12] float32.
     """
     count, parts, layers = forecast.weight.shape[0], *forecast.mean.shape[1:3]
     if not count:
@@ -123,15 +123,18 @@ def tubes_of(
     disc = np.maximum(np.array(tracks.last_radius), forecast.radius)[:, None] + v_b * reached
     disc += kept
 
-    rows = np.zeros((layers, count, parts, 9))
-    rows[..., 0] = first[:, None, None]
-    rows[..., 1:3] = np.moveaxis(forecast.mean[..., :2], 2, 0) - np.array(window.anchor)
-    rows[..., 3] = np.moveaxis(form[..., 0, 0], 2, 0)
-    rows[..., 4] = np.moveaxis(form[..., 0, 1], 2, 0)
-    rows[..., 5] = np.moveaxis(form[..., 1, 1], 2, 0)
-    rows[..., 6:8] = (np.array(tracks.last_centre) - np.array(window.anchor))[:, None]
-    rows[..., 8] = np.moveaxis(disc, 1, 0)[..., None]
-    return rows[np.broadcast_to(~dropped, (layers, count, parts))].astype(np.float32)
+    anchor = np.array(window.anchor)
+    rows = np.zeros((count, parts, layers, 12))
+    rows[..., 0] = first
+    rows[..., 1:3] = forecast.mean[..., :2] - anchor
+    rows[..., 3], rows[..., 4], rows[..., 5] = form[..., 0, 0], form[..., 0, 1], form[..., 1, 1]
+    rows[..., 6:8] = (np.array(tracks.last_centre) - anchor)[:, None, None]
+    rows[..., 8] = disc[:, None]
+    rows[:, :, 0, 9] = 1
+    up = np.sqrt(outer[..., 1, 1])
+    rows[..., 10] = np.maximum(rows[..., 2] - up, rows[..., 7] - rows[..., 8]) - SLACK
+    rows[..., 11] = np.minimum(rows[..., 2] + up, rows[..., 7] + rows[..., 8]) + SLACK
+    return rows[~dropped].reshape(-1, 12).astype(np.float32)
 
 
 def overlaid(
@@ -148,7 +151,7 @@ def overlaid(
 
     Args:
         hidden: [J, I] uint16 arrival times of hidden movers at the bound of speed.
-        tubes: [K, 9] of tracked ones.
+        tubes: [K, 12] of tracked ones.
         unexplained: [n, 2] returns that may move and belong to no track [m].
         window: where the cells lie.
         base: from which ticks count [s].

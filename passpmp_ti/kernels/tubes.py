@@ -5,8 +5,9 @@ forecast an ellipse about where its track says, cut by the disc that it can have
 bound of speed. A cell that a tube has come to is not given back when it has passed: arrival times
 only tell when a place is first lost, which errs to the unsafe side.
 
-    tubes f32 [K, 9], in order of time: 0 first tick, 1 x, 2 y of the ellipse's middle, 3 xx, 4 xy,
-        5 yy of the form that is at most 1 inside it, 6 x, 7 y, 8 radius of the disc;
+    tubes f32 [K, 12], one tube's moments after another's: 0 first tick, 1 x, 2 y of the ellipse's
+        middle, 3 xx, 4 xy, 5 yy of the form that is at most 1 inside it, 6 x, 7 y, 8 radius of the
+        disc, 9: 1 where a tube begins, 10 least, 11 greatest y of what is inside both;
         places in metres from the anchor, grown by the clearance and by half a cell's diagonal
 """
 
@@ -15,7 +16,7 @@ import taichi as ti
 from passpmp_ti.kernels.arrival import LATEST, NEVER, Arrival
 from passpmp_ti.kernels.launch import kernel
 
-MIDDLE, FORM, DISC, RADIUS = 1, 3, 6, 8
+MIDDLE, FORM, DISC, RADIUS, BEGINS, LOW, HIGH = 1, 3, 6, 8, 9, 10, 11
 ROUNDING = 1e-3
 """[cells] by which f32 sums may put a border short."""
 
@@ -54,6 +55,14 @@ def crossed(tubes: ti.template(), k, y):
     return high >= low, low, high
 
 
+@ti.func
+def lose(arrival: ti.template(), j, first, last, tick):
+    """Cells [first, last] of a row are free no longer than until `tick`."""
+    for i in range(first, last + 1):
+        if ti.cast(arrival[j, i], ti.i32) > tick:
+            arrival[j, i] = ti.cast(tick, ti.u16)
+
+
 @kernel
 def overlay(
     # in
@@ -61,7 +70,7 @@ def overlay(
     hidden: Arrival,  # [J, I] at the bound of speed
     stretch: ti.f32,  # bound of speed by the greatest that is asked about
     end: ti.i32,  # tick from which on nothing is promised
-    tubes: Tubes,  # [>= count, 9]
+    tubes: Tubes,  # [>= count, 12]
     count: ti.i32,
     corner_i: ti.i32,
     corner_j: ti.i32,
@@ -77,12 +86,25 @@ def overlay(
                 ticks = stretched(ti.cast(hidden[j, i], ti.i32), stretch)
                 arrival[j, i] = ti.cast(ti.min(ticks, end), ti.u16)
             y = (j + corner_j + 0.5) * cell
+            # what of the row this tube has come to so far
+            begin, end_ = 1, 0
             for k in range(count):
-                crosses, low, high = crossed(tubes, k, y)
+                if tubes[k, BEGINS] > 0.5:
+                    begin, end_ = 1, 0
+                crosses, low, high = False, 0.0, -1.0
+                if tubes[k, LOW] <= y <= tubes[k, HIGH]:
+                    crosses, low, high = crossed(tubes, k, y)
                 if crosses:
                     first = ti.cast(ti.floor(low / cell - ROUNDING), ti.i32) - corner_i
                     last = ti.cast(ti.floor(high / cell + ROUNDING), ti.i32) - corner_i
+                    first = ti.max(first, 0)
+                    last = ti.min(last, arrival.shape[1] - 1)
                     tick = ti.cast(tubes[k, 0], ti.i32)
-                    for i in range(ti.max(first, 0), ti.min(last, arrival.shape[1] - 1) + 1):
-                        if ti.cast(arrival[j, i], ti.i32) > tick:
-                            arrival[j, i] = ti.cast(tick, ti.u16)
+                    if first <= last and begin > end_:
+                        lose(arrival, j, first, last, tick)
+                        begin, end_ = first, last
+                    elif first <= last:
+                        # what lies between two of its places is lost as well: that is no less safe
+                        lose(arrival, j, first, begin - 1, tick)
+                        lose(arrival, j, end_ + 1, last, tick)
+                        begin, end_ = ti.min(begin, first), ti.max(end_, last)
