@@ -171,14 +171,21 @@ def overlaid(
     )  # fmt: skip
     if share < 1 and len(unexplained):
         # they are there for sure, and nothing tells how fast
-        mask = np.ones((window.size, window.size), dtype=np.uint8)
-        cells = np.floor((unexplained - np.array(window.origin)) / window.cell).astype(int)
-        inside = ((cells >= 0) & (cells < window.size)).all(axis=1)
-        mask[cells[inside, 1], cells[inside, 0]] = 0
-        capped = device.empty((window.size, window.size), np.uint16)
-        cap_memory(
-            device.put(distance_between_cells(mask)), asked, window.cell,
-            settings.clearance(robot), settings.object_speed, settings.stamp_error, 0, capped,
-        )  # fmt: skip
-        return capped
+        return capped(asked, unexplained, window, robot, settings)
     return asked
+
+
+def capped(
+    ticks: device.Array, places: np.ndarray, window: Window, robot: Robot, settings: Settings
+) -> device.Array:
+    """[J, I] uint16: arrival times, capped by cones at the bound of speed from places [n, 2] [m]."""
+    mask = np.ones((window.size, window.size), dtype=np.uint8)
+    cells = np.floor((places - np.array(window.origin)) / window.cell).astype(int)
+    inside = ((cells >= 0) & (cells < window.size)).all(axis=1)
+    mask[cells[inside, 1], cells[inside, 0]] = 0
+    result = device.empty((window.size, window.size), np.uint16)
+    cap_memory(
+        device.put(distance_between_cells(mask)), ticks, window.cell, settings.clearance(robot),
+        settings.object_speed, settings.stamp_error, 0, result,
+    )  # fmt: skip
+    return result

@@ -8,6 +8,8 @@ Nodes are rows of flat arrays, parents before children, siblings side by side.
     cost [cap, 6] f32: 0 integral of the guide along the plan to the node, 1 guide at the node,
         2 integral along the braking that proves the node, 3 guide at its end, 4 its duration [s],
         5 w_ps of the plan that ends here (eqs. 8 and 9): 1 where no risk is taken
+    risk [cap, 2] f32, where risk is weighed: what the motion to the node carries on, see
+        kernels/risk.py
 
 A level of few gaits for its nodes is grown along roads (kernels/roads.py), any other one by
 integrating from each node.
@@ -47,7 +49,9 @@ from passpmp_ti.kernels.motion import (
     speed_of,
     step,
 )
+from passpmp_ti.kernels.risk import risk2, risk_along
 from passpmp_ti.kernels.spans import Spans
+from passpmp_ti.kernels.weighing import borne_brake
 
 GROWN, BRAKED = 0, 1
 """What a node is: the end of a primitive, or the rest that a braking trajectory leads to."""
@@ -168,6 +172,7 @@ def grow_level(
     by_roads: ti.template(),  # whether `roads` hold the ways of the parents' gaits
     share: ti.template(),  # indices that one thread is handed at a time, see device.share
     grain: ti.template(),  # children that one thread checks in one go
+    weighed: ti.template(),  # whether a risk is allowed, and how great it is; never by roads
     arrival: Arrival,  # [J, I]
     spans: Spans,  # [F]
     guide: ti.types.ndarray(dtype=ti.f32, ndim=2),
@@ -177,6 +182,17 @@ def grow_level(
     counts: Counts,
     braking: Table,  # [B, 3]
     controls: Table,  # [U, 3]
+    hidden: Arrival,  # [J, I], this and the next ones where risk is weighed: see kernels/risk.py
+    hidden_spans: Spans,
+    windows: Table,
+    places: Links,
+    slots: Links,
+    near: Table,
+    pool: Numbers,
+    odds: Numbers,
+    tally: Counts,
+    allowed: ti.f32,  # greatest risk of a plan
+    allowed_rate: ti.f32,  # and for each second of it [1/s]
     first: ti.i32,  # nodes [first, last) are this chunk's parents
     last: ti.i32,
     slot: ti.i32,  # nodes in the tree so far
@@ -189,8 +205,9 @@ def grow_level(
     link: Links,
     cost: Table,
     gait: Counts,  # [cap], of parents and children where `by_roads`
+    risk: Table,  # [cap, 2], of parents and children where `weighed`
     # scratch
-    child: Table,  # [M, 9] pose, integral of the guide, guide at the end
+    child: Table,  # [M, 12] pose, integral of the guide, guide at the end, risk carried on, w_ps
     child_proof: Counts,  # [M]: 1 + braking control, 0: not safe
     block: Counts,  # [blocks + 1] slots that blocks of parents take, then where they begin
     # out
@@ -230,10 +247,29 @@ def grow_level(
                         control_of(controls, m % per_parent), steps,
                     )  # fmt: skip
                     if clear:
-                        proof = proving_brake(
-                            kind, arrival, spans, numbers, counts, braking, robot, q,
-                            tick + steps * counts[4],
-                        )  # fmt: skip
+                        if ti.static(weighed):
+                            start = pose_of(pose, parent)
+                            carried, _, _ = risk_along(
+                                kind, hidden, hidden_spans, numbers, counts, robot, windows, places,
+                                slots, near, pool, odds, tally, start, tick,
+                                control_of(controls, m % per_parent), heading_for(kind, start),
+                                steps, allowed, risk2(risk[parent, 0], risk[parent, 1]),
+                            )  # fmt: skip
+                            elapsed = (tick - link[0, TICK]) * numbers[1] / counts[4]
+                            proof, chance = borne_brake(
+                                kind, arrival, spans, hidden, hidden_spans, numbers, counts,
+                                braking, robot, windows, places, slots, near, pool, odds, tally, q,
+                                tick + steps * counts[4], carried, elapsed + steps * numbers[1],
+                                allowed, allowed_rate,
+                            )  # fmt: skip
+                            child[m, 9] = carried[0]
+                            child[m, 10] = carried[1]
+                            child[m, 11] = 1.0 / (1.0 - chance)
+                        else:
+                            proof = proving_brake(
+                                kind, arrival, spans, numbers, counts, braking, robot, q,
+                                tick + steps * counts[4],
+                            )  # fmt: skip
                     if proof > 0:
                         store_pose(child, m, q)
                         child[m, 7] = cost[parent, 0] + spent
@@ -338,6 +374,10 @@ def grow_level(
                             cost[at, 3] = at_rest_cost
                             cost[at, 4] = seconds
                             cost[at, 5] = 1.0
+                            if ti.static(weighed):
+                                risk[at, 0] = child[m, 9]
+                                risk[at, 1] = child[m, 10]
+                                cost[at, 5] = child[m, 11]
                             at += 1
                 elif fits:
                     store_braking(
