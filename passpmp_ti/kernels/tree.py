@@ -49,10 +49,10 @@ from passpmp_ti.kernels.motion import (
     speed_of,
     step,
 )
-from passpmp_ti.kernels.risk import risk2, risk_along
 from passpmp_ti.kernels.spans import Spans
-from passpmp_ti.kernels.weighing import borne_brake
 
+CHECK, PLACE, BOTH = 1, 2, 3
+"""Parts of the growth of a chunk: which children are safe, and where in the tree they go."""
 GROWN, BRAKED = 0, 1
 """What a node is: the end of a primitive, or the rest that a braking trajectory leads to."""
 
@@ -172,7 +172,7 @@ def grow_level(
     by_roads: ti.template(),  # whether `roads` hold the ways of the parents' gaits
     share: ti.template(),  # indices that one thread is handed at a time, see device.share
     grain: ti.template(),  # children that one thread checks in one go
-    weighed: ti.template(),  # whether a risk is allowed, and how great it is; never by roads
+    part: ti.template(),  # CHECK, PLACE, or BOTH: between them risks are weighed (kernels/weighing)
     arrival: Arrival,  # [J, I]
     spans: Spans,  # [F]
     guide: ti.types.ndarray(dtype=ti.f32, ndim=2),
@@ -182,17 +182,6 @@ def grow_level(
     counts: Counts,
     braking: Table,  # [B, 3]
     controls: Table,  # [U, 3]
-    hidden: Arrival,  # [J, I], this and the next ones where risk is weighed: see kernels/risk.py
-    hidden_spans: Spans,
-    windows: Table,
-    places: Links,
-    slots: Links,
-    near: Table,
-    pool: Numbers,
-    odds: Numbers,
-    tally: Counts,
-    allowed: ti.f32,  # greatest risk of a plan
-    allowed_rate: ti.f32,  # and for each second of it [1/s]
     first: ti.i32,  # nodes [first, last) are this chunk's parents
     last: ti.i32,
     slot: ti.i32,  # nodes in the tree so far
@@ -217,174 +206,157 @@ def grow_level(
     capacity = pose.shape[0]
     blocks = ti.min(block.shape[0] - 1, 1 + (last - first) // FEW)
     children = (last - first) * per_parent
-    for index in range((children + grain - 1) // grain * share):
-        if index % share == 0:
-            begin = index // share * grain
-            for m in range(begin, ti.min(begin + grain, children)):
-                parent = first + m // per_parent
-                proof = 0
-                if ti.static(by_roads):
-                    if link[parent, WHAT] == GROWN:
+    if ti.static(part != PLACE):
+        for index in range((children + grain - 1) // grain * share):
+            if index % share == 0:
+                begin = index // share * grain
+                for m in range(begin, ti.min(begin + grain, children)):
+                    parent = first + m // per_parent
+                    proof = 0
+                    if ti.static(by_roads):
+                        if link[parent, WHAT] == GROWN:
+                            tick = link[parent, TICK]
+                            road = gait[parent] * per_parent + m % per_parent
+                            x, y = pose[parent, X], pose[parent, Y]
+                            c, s = pose[parent, C], pose[parent, S]
+                            if road_clear(
+                                arrival, spans, numbers, counts, roads, rows, road, x, y, c, s, tick
+                            ):
+                                q = placed(rows, roads[road, 0] + steps, x, y, c, s)
+                                proof = proving_road(
+                                    arrival, spans, numbers, counts, roads, rows,
+                                    number * per_parent + roads[road, 4] * counts[6],
+                                    q[X], q[Y], q[C], q[S], tick + steps * counts[4],
+                                )  # fmt: skip
+                    elif link[parent, WHAT] == GROWN:
+                        robot = robot_of(numbers)
                         tick = link[parent, TICK]
-                        road = gait[parent] * per_parent + m % per_parent
-                        x, y = pose[parent, X], pose[parent, Y]
-                        c, s = pose[parent, C], pose[parent, S]
-                        if road_clear(
-                            arrival, spans, numbers, counts, roads, rows, road, x, y, c, s, tick
-                        ):
-                            q = placed(rows, roads[road, 0] + steps, x, y, c, s)
-                            proof = proving_road(
-                                arrival, spans, numbers, counts, roads, rows,
-                                number * per_parent + roads[road, 4] * counts[6],
-                                q[X], q[Y], q[C], q[S], tick + steps * counts[4],
-                            )  # fmt: skip
-                elif link[parent, WHAT] == GROWN:
-                    robot = robot_of(numbers)
-                    tick = link[parent, TICK]
-                    clear, q, spent, there = driven_clear(
-                        kind, arrival, spans, guide, ahead, guide_frame, numbers, counts, robot,
-                        pose_of(pose, parent), tick,
-                        control_of(controls, m % per_parent), steps,
-                    )  # fmt: skip
-                    if clear:
-                        if ti.static(weighed):
-                            start = pose_of(pose, parent)
-                            carried, _, _ = risk_along(
-                                kind, hidden, hidden_spans, numbers, counts, robot, windows, places,
-                                slots, near, pool, odds, tally, start, tick,
-                                control_of(controls, m % per_parent), heading_for(kind, start),
-                                steps, allowed, risk2(risk[parent, 0], risk[parent, 1]),
-                            )  # fmt: skip
-                            elapsed = (tick - link[0, TICK]) * numbers[1] / counts[4]
-                            proof, chance = borne_brake(
-                                kind, arrival, spans, hidden, hidden_spans, numbers, counts,
-                                braking, robot, windows, places, slots, near, pool, odds, tally, q,
-                                tick + steps * counts[4], carried, elapsed + steps * numbers[1],
-                                allowed, allowed_rate,
-                            )  # fmt: skip
-                            child[m, 9] = carried[0]
-                            child[m, 10] = carried[1]
-                            child[m, 11] = 1.0 / (1.0 - chance)
-                        else:
+                        clear, q, spent, there = driven_clear(
+                            kind, arrival, spans, guide, ahead, guide_frame, numbers, counts, robot,
+                            pose_of(pose, parent), tick,
+                            control_of(controls, m % per_parent), steps,
+                        )  # fmt: skip
+                        if clear:
                             proof = proving_brake(
                                 kind, arrival, spans, numbers, counts, braking, robot, q,
                                 tick + steps * counts[4],
                             )  # fmt: skip
-                    if proof > 0:
-                        store_pose(child, m, q)
-                        child[m, 7] = cost[parent, 0] + spent
-                        child[m, 8] = there
-                child_proof[m] = proof
+                        if proof > 0:
+                            store_pose(child, m, q)
+                            child[m, 7] = cost[parent, 0] + spent
+                            child[m, 8] = there
+                    child_proof[m] = proof
 
-    # Slots go by the order of nodes, whoever counts them: the same tree on every run.
-    for index in range(blocks * share):
-        if index % share == 0:
-            b = index // share
-            end = block_begin(b + 1, blocks, first, last)
-            taken = 0
-            for parent in range(block_begin(b, blocks, first, last), end):
-                taken += ti.abs(room_for(kind, pose, link, child_proof, parent, first, per_parent))
-            block[b] = taken
-    ti.loop_config(serialize=True)
-    for _ in range(1):
-        begin = slot
-        for b in range(blocks):
-            taken = block[b]
-            block[b] = begin
-            begin += taken
-        block[blocks] = begin
-        grown[0] = begin
-        grown[1] = 0
-        if begin > capacity:
-            # from the first parent that does not fit, none does
-            b = blocks - 1
-            while block[b] > capacity:
-                b -= 1
-            end = block[b]
-            parent = block_begin(b, blocks, first, last)
-            full = False
-            while not full:
-                room = ti.abs(room_for(kind, pose, link, child_proof, parent, first, per_parent))
-                if end + room > capacity:
-                    full = True
-                else:
-                    end += room
-                    parent += 1
-            grown[0] = end
-            grown[1] = last - parent
+    if ti.static(part != CHECK):
+        # Slots go by the order of nodes, whoever counts them: the same tree on every run.
+        for index in range(blocks * share):
+            if index % share == 0:
+                b = index // share
+                end = block_begin(b + 1, blocks, first, last)
+                taken = 0
+                for parent in range(block_begin(b, blocks, first, last), end):
+                    taken += ti.abs(room_for(kind, pose, link, child_proof, parent, first, per_parent))
+                block[b] = taken
+        ti.loop_config(serialize=True)
+        for _ in range(1):
+            begin = slot
+            for b in range(blocks):
+                taken = block[b]
+                block[b] = begin
+                begin += taken
+            block[blocks] = begin
+            grown[0] = begin
+            grown[1] = 0
+            if begin > capacity:
+                # from the first parent that does not fit, none does
+                b = blocks - 1
+                while block[b] > capacity:
+                    b -= 1
+                end = block[b]
+                parent = block_begin(b, blocks, first, last)
+                full = False
+                while not full:
+                    room = ti.abs(room_for(kind, pose, link, child_proof, parent, first, per_parent))
+                    if end + room > capacity:
+                        full = True
+                    else:
+                        end += room
+                        parent += 1
+                grown[0] = end
+                grown[1] = last - parent
 
-    for index in range(blocks * share):
-        if index % share == 0:
-            b = index // share
-            slot_now = block[b]
-            end = block_begin(b + 1, blocks, first, last)
-            for parent in range(block_begin(b, blocks, first, last), end):
-                found = room_for(kind, pose, link, child_proof, parent, first, per_parent)
-                room = ti.abs(found)
-                fits = found != 0 and slot_now + room <= capacity
-                link[parent, FIRST] = -1
-                link[parent, CHILDREN] = 0
-                if fits:
-                    link[parent, FIRST] = slot_now
-                    link[parent, CHILDREN] = room
-                if fits and found > 0:
-                    at = slot_now
-                    for k in range(per_parent):
-                        m = (parent - first) * per_parent + k
-                        if child_proof[m] > 0:
-                            q = pose7(0.0)
-                            spent, there, after, at_rest_cost, seconds = 0.0, 0.0, 0.0, 0.0, 0.0
-                            if ti.static(by_roads):
-                                road = gait[parent] * per_parent + k
-                                start = pose_of(pose, parent)
-                                q = road_end(rows, roads, road, steps, start)
-                                spent, there = road_cost(
-                                    guide, ahead, guide_frame, numbers, roads, rows, road, steps,
-                                    SAMPLES, start, cost[parent, 1],
-                                )  # fmt: skip
-                                spent += cost[parent, 0]
-                                gait[at] = roads[road, 4]
-                                brake = number * per_parent + roads[road, 4] * counts[6]
-                                brake += child_proof[m] - 1
-                                seconds = roads[brake, 1] * numbers[1]
-                                after, at_rest_cost = road_cost(
-                                    guide, ahead, guide_frame, numbers, roads, rows, brake,
-                                    roads[brake, 1], BRAKING_SAMPLES, q, there,
-                                )  # fmt: skip
-                            else:
-                                q = pose_of(child, m)
-                                spent = child[m, 7]
-                                there = child[m, 8]
-                                after, at_rest_cost, seconds = braking_cost(
-                                    kind, guide, ahead, guide_frame, numbers, robot_of(numbers), q,
-                                    there, control_of(braking, child_proof[m] - 1),
-                                )  # fmt: skip
-                            store_pose(pose, at, q)
-                            link[at, PARENT] = parent
-                            link[at, CONTROL] = k
-                            link[at, STEPS] = steps
-                            link[at, TICK] = link[parent, TICK] + steps * counts[4]
-                            link[at, PROOF] = child_proof[m] - 1
-                            link[at, FIRST] = -1
-                            link[at, CHILDREN] = 0
-                            link[at, WHAT] = GROWN
-                            cost[at, 0] = spent
-                            cost[at, 1] = there
-                            cost[at, 2] = after
-                            cost[at, 3] = at_rest_cost
-                            cost[at, 4] = seconds
-                            cost[at, 5] = 1.0
-                            if ti.static(weighed):
-                                risk[at, 0] = child[m, 9]
-                                risk[at, 1] = child[m, 10]
-                                cost[at, 5] = child[m, 11]
-                            at += 1
-                elif fits:
-                    store_braking(
-                        kind, guide, ahead, guide_frame, numbers, counts, braking, parent, slot_now,
-                        pose, link, cost,
-                    )  # fmt: skip
-                slot_now += room
+        for index in range(blocks * share):
+            if index % share == 0:
+                b = index // share
+                slot_now = block[b]
+                end = block_begin(b + 1, blocks, first, last)
+                for parent in range(block_begin(b, blocks, first, last), end):
+                    found = room_for(kind, pose, link, child_proof, parent, first, per_parent)
+                    room = ti.abs(found)
+                    fits = found != 0 and slot_now + room <= capacity
+                    link[parent, FIRST] = -1
+                    link[parent, CHILDREN] = 0
+                    if fits:
+                        link[parent, FIRST] = slot_now
+                        link[parent, CHILDREN] = room
+                    if fits and found > 0:
+                        at = slot_now
+                        for k in range(per_parent):
+                            m = (parent - first) * per_parent + k
+                            if child_proof[m] > 0:
+                                q = pose7(0.0)
+                                spent, there, after, at_rest_cost, seconds = 0.0, 0.0, 0.0, 0.0, 0.0
+                                if ti.static(by_roads):
+                                    road = gait[parent] * per_parent + k
+                                    start = pose_of(pose, parent)
+                                    q = road_end(rows, roads, road, steps, start)
+                                    spent, there = road_cost(
+                                        guide, ahead, guide_frame, numbers, roads, rows, road, steps,
+                                        SAMPLES, start, cost[parent, 1],
+                                    )  # fmt: skip
+                                    spent += cost[parent, 0]
+                                    gait[at] = roads[road, 4]
+                                    brake = number * per_parent + roads[road, 4] * counts[6]
+                                    brake += child_proof[m] - 1
+                                    seconds = roads[brake, 1] * numbers[1]
+                                    after, at_rest_cost = road_cost(
+                                        guide, ahead, guide_frame, numbers, roads, rows, brake,
+                                        roads[brake, 1], BRAKING_SAMPLES, q, there,
+                                    )  # fmt: skip
+                                else:
+                                    q = pose_of(child, m)
+                                    spent = child[m, 7]
+                                    there = child[m, 8]
+                                    after, at_rest_cost, seconds = braking_cost(
+                                        kind, guide, ahead, guide_frame, numbers, robot_of(numbers), q,
+                                        there, control_of(braking, child_proof[m] - 1),
+                                    )  # fmt: skip
+                                store_pose(pose, at, q)
+                                link[at, PARENT] = parent
+                                link[at, CONTROL] = k
+                                link[at, STEPS] = steps
+                                link[at, TICK] = link[parent, TICK] + steps * counts[4]
+                                link[at, PROOF] = child_proof[m] - 1
+                                link[at, FIRST] = -1
+                                link[at, CHILDREN] = 0
+                                link[at, WHAT] = GROWN
+                                cost[at, 0] = spent
+                                cost[at, 1] = there
+                                cost[at, 2] = after
+                                cost[at, 3] = at_rest_cost
+                                cost[at, 4] = seconds
+                                cost[at, 5] = 1.0
+                                if ti.static(part == PLACE):
+                                    risk[at, 0] = child[m, 9]
+                                    risk[at, 1] = child[m, 10]
+                                    cost[at, 5] = child[m, 11]
+                                at += 1
+                    elif fits:
+                        store_braking(
+                            kind, guide, ahead, guide_frame, numbers, counts, braking, parent, slot_now,
+                            pose, link, cost,
+                        )  # fmt: skip
+                    slot_now += room
 
 
 @ti.func

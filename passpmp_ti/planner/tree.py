@@ -12,11 +12,14 @@ from passpmp_ti.grid.body import to_poses, to_states
 from passpmp_ti.grid.model import TICK, FutureModel
 from passpmp_ti.kernels.check import trace
 from passpmp_ti.kernels.tree import (
+    BOTH,
     BRAKED,
+    CHECK,
     CHILDREN,
     CONTROL,
     FIRST,
     PARENT,
+    PLACE,
     STEPS,
     WHAT,
     grow_level,
@@ -24,7 +27,7 @@ from passpmp_ti.kernels.tree import (
     trail,
 )
 from passpmp_ti.kernels.tree import TICK as TICK_COLUMN
-from passpmp_ti.kernels.weighing import begin_risk, multiply_weights
+from passpmp_ti.kernels.weighing import begin_risk, multiply_weights, weigh_children
 from passpmp_ti.planner.guide import GuideField
 from passpmp_ti.planner.roads import Roads
 from passpmp_ti.robots import Robot
@@ -274,8 +277,7 @@ class TreeGrower:
         )
         fixed = (
             model.ticks, model.spans, guide.time, guide.ahead, guide.frame, body.numbers,
-            model.counts, body.braking, body.controls, *model.risk_arrays, settings.allowed_risk,
-            settings.allowed_risk_rate,
+            model.counts, body.braking, body.controls,
         )  # fmt: skip
         if self._weighed:
             begin_risk(
@@ -304,12 +306,23 @@ class TreeGrower:
                         stopped_by = "time"
                         break
                 before = count
-                grow_level(
-                    body.kind, by_roads, device.share(), self._grains[by_roads], self._weighed,
+                chunk = (
                     *fixed, first, first + parents, count, steps, roads.number, roads.links,
                     roads.rows, *arrays, roads.gait, self._risk, self._child, self._child_proof,
                     self._block, self._grown,
                 )  # fmt: skip
+                how = body.kind, by_roads, device.share(), self._grains[by_roads]
+                if self._weighed:
+                    grow_level(*how, CHECK, *chunk)
+                    weigh_children(
+                        body.kind, device.share(), model.ticks, model.spans, body.numbers,
+                        model.counts, body.braking, body.controls, *model.risk_arrays,
+                        settings.allowed_risk, settings.allowed_risk_rate, first, first + parents,
+                        steps, *arrays[:2], self._risk, self._child, self._child_proof,
+                    )  # fmt: skip
+                    grow_level(*how, PLACE, *chunk)
+                else:
+                    grow_level(*how, BOTH, *chunk)
                 count, short = (int(n) for n in device.host(self._grown))
                 fan = (count - before) / parents
                 first += parents
@@ -335,7 +348,9 @@ def _weigh_as_printed(
 ) -> None:
     """w_ps of every plan by eqs. 9 to 17 as printed; nothing is pruned by it."""
     poses, links = device.host(pose)[:count], device.host(link)[:count]
-    states = model.robot.within_limits(to_states(poses, model.window.anchor))
+    states = np.array(
+        [model.robot.within_limits(state) for state in to_states(poses, model.window.anchor)]
+    )
     times = model.base + links[:, TICK_COLUMN] * TICK
     chance = model.collision_probability(states, times).astype(np.float32)
     multiply_weights(count, link, device.put(chance), cost)
