@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from dataclasses import replace
 
 import numpy as np
 
@@ -20,17 +18,10 @@ from hardware.scip import (
 )
 from hardware.scip_commands import Command, Measure, decode_command
 from hardware.scip_rotor import Nature, Rotor
-from hardware.scip_sweep import FIRST_CODE, Sweep, distances_of, encode_sweep
-from passpmp_ti import door
+from hardware.scip_sweeper import Source, Sweeper
 
 Answer = tuple[str, tuple[bytes, ...]]
 """Status and lines."""
-Source = Callable[[float], np.ndarray]
-"""From when a sweep begins on the host's clock [s] to what each step, from the device's first to
-its last, measures then: floats are ranges as a `Scan` means them [m], whole numbers are sent as
-they are [mm]."""
-
-FAULTS = ("checksum", "drop", "freeze", "stall", "truncate", "unstable")
 STANDBY, ADJUSTING, SINGLE, MULTI, ASLEEP = "000", "002", "003", "004", "005"
 STATES = {
     STANDBY: "Idle", ADJUSTING: "Adjusting", SINGLE: "Single", MULTI: "Measuring", ASLEEP: "Sleep",
@@ -43,8 +34,6 @@ MOST_ASKED = 16
 """Single sweeps under way; more are denied."""
 MOST_UNSENT = 1 << 17
 """[bytes]; what finds no room is not answered."""
-STRENGTH = 1000
-"""The intensity of every return."""
 
 
 class Device:
@@ -63,31 +52,20 @@ class Device:
         """
         self.nature = Nature() if nature is None else nature
         self.state = STANDBY
-        self.rotor = Rotor(self.nature, now)
-        self._source = source
-        self._faults = dict.fromkeys(FAULTS, 0)
-        self._seen: np.ndarray | None = None
-        self._next = 0  # the first turn that is not looked at yet
+        self._sweeper = Sweeper(source, self.nature, now)
         self._up_at = -math.inf
         self._reboot_at = math.inf
         self._asked_to_reboot = -math.inf
         self._forget_host()
 
     def inject(self, fault: str, sweeps: int = 1) -> None:
-        """Make something go wrong with the next sweeps that are sent.
+        """Make something go wrong, as `Sweeper.inject` says."""
+        self._sweeper.inject(fault, sweeps)
 
-        Args:
-            fault: "checksum": a byte is changed; "drop": not sent; "freeze": the distances of the
-                sweep before, with a new stamp; "stall": held back, and sent all at once when the
-                last of them is ready; "truncate": its second half is missing; "unstable": the
-                device says that it is, and sends no distances.
-            sweeps: how many; 0 ends the fault.
-
-        Raises:
-            ValueError: no such fault.
-        """
-        door.choice("Device", "inject", fault, FAULTS)
-        self._faults[fault] = door.whole("Device", "inject", sweeps, least=0)
+    @property
+    def rotor(self) -> Rotor:
+        """Its clock and its mirror."""
+        return self._sweeper.rotor
 
     def is_up(self, now: float) -> bool:
         """Whether a host may connect, and stay."""
@@ -96,7 +74,7 @@ class Device:
     def connect(self, now: float) -> None:
         """A host is there."""
         self._forget_host()
-        self._next = max(self._next, self.rotor.first_after(now))
+        self._sweeper.skip_to(now)
 
     def disconnect(self) -> None:
         """The host is gone; nothing of it is remembered but the state that it left."""
@@ -126,28 +104,21 @@ class Device:
         """What is to be sent by now; each byte is returned once."""
         if now >= self._reboot_at:
             self.reboot(now)
-        # after a pause the sweeps that went by are not made up for
-        self._next = max(self._next, self.rotor.first_after(now) - 4)
-        while self.rotor.ready(self._next) <= now:
-            if self._stream is not None or self._asked:
-                self._tell(self._next)
-            self._next += 1
+        self._out += self._sweeper.advance(now)
+        if self.state == MULTI and not self._sweeper.streams:
+            self.state = STANDBY
         out = bytes(self._out)
         self._out.clear()
         return out
 
     def next_event(self) -> float:
         """When `advance` may have something new, without anything received [s]."""
-        busy = self._stream is not None or self._asked
-        return min(self._reboot_at, self.rotor.ready(self._next) if busy else math.inf)
+        return min(self._reboot_at, self._sweeper.next_event())
 
     def _forget_host(self) -> None:
         self._lines = Splitter(b"\n", 4 * LONGEST_COMMAND)
         self._out = bytearray()
-        self._held = bytearray()
-        self._asked: list[Measure] = []
-        self._stream: Measure | None = None
-        self._from = 0  # the turn with which the stream begins
+        self._sweeper.end()
         if self.state == MULTI:
             self.state = STANDBY
 
@@ -172,14 +143,14 @@ class Device:
         if command.start > command.end:
             raise Refused("05", "the last step is before the first")
         if not command.streams:
-            if self.state != SINGLE or len(self._asked) >= MOST_ASKED:
+            if self.state != SINGLE or len(self._sweeper.asked) >= MOST_ASKED:
                 raise Refused("10", "the laser is off, or a stream is under way")
-            self._asked.append(command)
+            self._sweeper.asked.append(command)
             return None
         if self.state not in (STANDBY, SINGLE):
             raise Refused("10", "another stream is under way, or the device is not awake")
-        self.state, self._stream = MULTI, command
-        self._from = self._next = max(self._next, self.rotor.first_after(now))
+        self.state = MULTI
+        self._sweeper.stream(command, now)
         return Reply(echo, "00")
 
     def _light(self, _: str, now: float) -> Answer:
@@ -262,79 +233,5 @@ class Device:
         return "00", (summed(self.state.encode("ascii")),)
 
     def _end_sweeps(self) -> None:
-        self.state, self._stream = STANDBY, None
-        self._asked.clear()
-        self._held.clear()
-
-    def _tell(self, turn: int) -> None:
-        """Send one turn's sweep to whoever asked for it."""
-        distances = self._look(turn)
-        stamp = self.rotor.reading(self.rotor.begin(turn))
-        asked, self._asked = self._asked, []
-        for command in asked:
-            self._deliver(command, _part(command, distances, stamp, self.nature), 0)
-        stream = self._stream
-        if stream is None or (turn - self._from) % (stream.skip + 1):
-            return
-        if stream.count:
-            stream = replace(stream, count=stream.count - 1)
-            self._stream = stream if stream.count else None
-        self._deliver(stream, _part(stream, distances, stamp, self.nature), stream.count)
-        if self._stream is None:
-            self.state = STANDBY
-
-    def _look(self, turn: int) -> np.ndarray:
-        """[steps] mm or codes."""
-        if self._seen is not None and self._spend("freeze"):
-            return self._seen
-        seen = np.asarray(self._source(self.rotor.begin(turn)))
-        p = self.nature.parameters
-        if seen.shape != (p.steps,):
-            raise ValueError(
-                f"Device.source must return {p.steps} values, one for each step from {p.first} to"
-                f" {p.last}; got shape {seen.shape}"
-            )
-        if not np.issubdtype(seen.dtype, np.integer):
-            seen = distances_of(seen, p, self.nature.codes)
-        self._seen = seen.astype(np.int64)
-        return self._seen
-
-    def _deliver(self, command: Measure, sweep: Sweep, remaining: int) -> None:
-        frame = encode_reply(encode_sweep(command, sweep, remaining))
-        if self._spend("unstable"):
-            frame = encode_reply(Reply(replace(command, count=remaining).encode(), "0M"))
-        if self._spend("checksum"):
-            middle = len(frame) // 2
-            frame = frame[:middle] + bytes([frame[middle] ^ 1]) + frame[middle + 1 :]
-        if self._spend("truncate"):
-            frame = frame[: len(frame) // 2]
-        if self._spend("drop"):
-            return
-        stalled = self._spend("stall")
-        if len(self._out) + len(self._held) > MOST_UNSENT:
-            return
-        self._held += frame
-        if not (stalled and self._faults["stall"]):
-            self._out += self._held
-            self._held.clear()
-
-    def _spend(self, fault: str) -> bool:
-        """Whether this sweep has the fault."""
-        left = self._faults[fault]
-        self._faults[fault] = max(0, left - 1)
-        return left > 0
-
-
-def _part(command: Measure, distances: np.ndarray, stamp: int, nature: Nature) -> Sweep:
-    """The steps that a command asks for; of each cluster the least distance, else a code."""
-    p = nature.parameters
-    asked = distances[command.start - p.first : command.end - p.first + 1]
-    if command.cluster > 1:
-        # a code stands only where no step of the cluster has a distance
-        measured = (asked >= p.nearest) & (asked < FIRST_CODE)
-        order = np.where(measured, asked, asked + FIRST_CODE + 4)
-        starts = np.arange(0, len(asked), command.cluster)
-        least = np.minimum.reduceat(order, starts)
-        asked = np.where(least > FIRST_CODE + 3, least - FIRST_CODE - 4, least)
-    strength = np.where((asked >= p.nearest) & (asked < FIRST_CODE), STRENGTH, 0)
-    return Sweep(stamp, asked, strength)
+        self.state = STANDBY
+        self._sweeper.end()

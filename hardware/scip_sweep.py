@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -142,13 +142,12 @@ class Sweep:
     """[n] int64, or None where they were not asked for."""
 
 
-def encode_sweep(command: Measure, sweep: Sweep, remaining: int = 0) -> Reply:
+def encode_sweep(command: Measure, sweep: Sweep) -> Reply:
     """The reply that carries a sweep.
 
     Args:
-        command: what was asked.
+        command: what was asked; of a stream that ends, its count are the sweeps still to come.
         sweep: its answer; numbers too great for the command's width become the greatest there is.
-        remaining: sweeps of a stream still to come; 0 in a stream without end.
     """
     values = sweep.distances
     if command.intensities:
@@ -156,9 +155,8 @@ def encode_sweep(command: Measure, sweep: Sweep, remaining: int = 0) -> Reply:
         values = np.stack([values, strength], axis=1).ravel()
     text = encode_numbers(np.minimum(values, 64**command.width - 1), command.width)
     stamp = summed(encode_numbers(np.array([sweep.stamp]), 4))
-    echo = replace(command, count=remaining).encode()
     status = "99" if command.streams else "00"
-    return Reply(echo, status, (stamp, *encode_block(text)))
+    return Reply(command.encode(), status, (stamp, *encode_block(text)))
 
 
 def decode_sweep(command: Measure, reply: Reply) -> Sweep:
