@@ -34,7 +34,7 @@ from hardware.scip import (
 )
 from hardware.scip_client import ScipClient
 from hardware.scip_commands import Measure, Plain, decode_command
-from hardware.scip_device import BOOT_TIME, MOST_UNSENT, REBOOT_DELAY, Device
+from hardware.scip_device import MOST_UNSENT, REBOOT_DELAY, Device
 from hardware.scip_emulator import Emulator
 from hardware.scip_rotor import Nature
 from hardware.scip_session import Session
@@ -243,7 +243,7 @@ class Network:
         self._client.close()
         self._peer.close()
         # it may have been told to reboot
-        until = time.monotonic() + 2 * (BOOT_TIME + REBOOT_DELAY)
+        until = time.monotonic() + 2 * (Nature().boot_time + REBOOT_DELAY)
         while not self._answers(b"") and time.monotonic() < until:
             time.sleep(0.05)
         answers = self._answers(b"")

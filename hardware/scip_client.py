@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import os
 import select
 import socket
 import time
@@ -138,7 +139,7 @@ class ScipClient:
         self._give_up_at = now + self.settings.answer_within
         failure = self._socket.connect_ex((self.settings.host, self.settings.port))
         if failure not in (0, errno.EINPROGRESS, errno.EWOULDBLOCK):
-            raise OSError(failure, errno.errorcode.get(failure, "no connection"))
+            raise OSError(failure, os.strerror(failure))
 
     def _finish_connecting(self, now: float) -> None:
         assert self._socket is not None
@@ -148,7 +149,7 @@ class ScipClient:
             return
         failure = self._socket.getsockopt(socket.SOL_SOCKET, socket.SO_ERROR)
         if failure:
-            raise OSError(failure, errno.errorcode.get(failure, "no connection"))
+            raise OSError(failure, os.strerror(failure))
         self._connecting = False
         self._session = Session(self.settings, now, counters=self.counters, pose_at=self._pose_at)
         self._send(self._socket, self._session)

@@ -26,8 +26,6 @@ STANDBY, ADJUSTING, SINGLE, MULTI, ASLEEP = "000", "002", "003", "004", "005"
 STATES = {
     STANDBY: "Idle", ADJUSTING: "Adjusting", SINGLE: "Single", MULTI: "Measuring", ASLEEP: "Sleep",
 }  # fmt: skip
-BOOT_TIME = 2.0
-"""[s] for which a device that was rebooted takes no connection."""
 REBOOT_DELAY = 1.0
 """[s] from the second RB to the reboot, and the longest from the first to the second."""
 MOST_ASKED = 16
@@ -84,7 +82,7 @@ class Device:
         """The connection ends, nothing answers for a while, and the clock begins at 0."""
         self._forget_host()
         self.state = STANDBY
-        self._up_at = now + BOOT_TIME
+        self._up_at = now + self.nature.boot_time
         self._reboot_at = math.inf
         self.rotor.reset_clock(now)
 

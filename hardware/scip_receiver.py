@@ -132,7 +132,7 @@ class Receiver:
             return None
         self._stamp = end
         counters.scans += 1
-        counters.late += at - end > self._settings.late
+        counters.late += int(at - end > self._settings.late)
         return self._scan(sweep, begin, end)
 
     def _is_frozen(self, sweep: Sweep) -> bool:

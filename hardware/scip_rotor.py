@@ -24,12 +24,15 @@ class Nature:
     """By how much longer than its parameters say a turn takes, as a share."""
     tick: float = 1e-3
     """A sweep is sent at a whole multiple of this on its clock [s]; some firmware has 5 ms."""
+    boot_time: float = 2.0
+    """For how long it takes no connection once it was rebooted [s]."""
 
     def __post_init__(self) -> None:
         name = "Nature"
         door.whole(name, "clock_start", self.clock_start, least=0, most=CLOCK_TURN - 1)
         door.finite(name, "clock_rate", self.clock_rate, least=0.5, most=2.0)
         door.finite(name, "unevenness", self.unevenness, least=-0.5, most=0.5)
+        door.finite(name, "boot_time", self.boot_time, least=0.0, unit="s")
         door.finite(name, "tick", self.tick, least=1e-6, most=1.0, unit="s")
 
 
