@@ -7,7 +7,6 @@ import os
 import select
 import socket
 import time
-from collections import deque
 from collections.abc import Callable, Sequence
 
 from hardware.scip import ScipError
@@ -18,8 +17,8 @@ from passpmp_ti.scan import Scan
 
 READ = 1 << 16
 """[bytes] taken from a socket at once."""
-KEPT = 8
-"""Scans that wait to be read; older ones give way."""
+MOST_READS = 100
+"""Pieces of that size taken in one step; no system keeps as much for a slow reader."""
 LONGEST_WAIT = 0.05
 """[s] between two looks at deadlines."""
 
@@ -54,7 +53,7 @@ class ScipClient:
         """Why the last connection, or attempt, ended; empty before any did."""
         self._clock = clock
         self._pose_at = pose_at
-        self._scans: deque[Scan] = deque(maxlen=KEPT)
+        self._newest: Scan | None = None  # that was not read yet
         self._socket: socket.socket | None = None
         self._connecting = False
         self._session: Session | None = None
@@ -85,7 +84,10 @@ class ScipClient:
         return None if self._socket is None else (self._socket, self._connecting)
 
     def read(self, timeout: float) -> Scan | None:
-        """The oldest scan that was not read yet; waits for it up to `timeout` [s].
+        """The newest scan, if it was not read yet; waits for one up to `timeout` [s].
+
+        Scans that came before it and were not read are passed over: who plans every tenth of a
+        second wants what is there now, not what was there in the order in which it came.
 
         Raises:
             ValueError: the device cannot do what the settings ask.
@@ -93,8 +95,9 @@ class ScipClient:
         until = self._clock() + timeout
         while True:
             self.step()
-            if self._scans:
-                return self._scans.popleft()
+            if self._newest is not None:
+                scan, self._newest = self._newest, None
+                return scan
             left = until - self._clock()
             if left <= 0:
                 return None
@@ -156,17 +159,19 @@ class ScipClient:
 
     def _exchange(self, link: socket.socket, session: Session, now: float) -> None:
         before = session.since
-        try:
-            data = link.recv(READ)
-        except BlockingIOError:
-            session.check(now)
-        else:
+        for _ in range(MOST_READS):
+            try:
+                data = link.recv(READ)
+            except BlockingIOError:
+                break
             if not data:
                 raise ScipError("the device closed the connection")
             # read again: an answer must not seem to have come earlier than it did
             now = self._clock()
-            self._scans.extend(session.receive(data, now))
-            session.check(now)
+            for scan in session.receive(data, now):
+                self.counters.passed += self._newest is not None
+                self._newest = scan
+        session.check(now)
         self.counters.connections += session.since < before
         if now - session.since > self.settings.retry_most:
             self._pause = self.settings.retry_first

@@ -49,6 +49,8 @@ class Counters:
     """Sweeps that could not be promised their stamp error; not handed out."""
     late: int = 0
     """Scans that were handed out, but had come late."""
+    passed: int = 0
+    """Scans that a newer one came after before they were read."""
 
 
 class Receiver:

@@ -23,7 +23,7 @@ from hardware.scip_clock import DeviceClock
 from hardware.scip_commands import Measure, Plain
 from hardware.scip_receiver import Counters, Pose, Receiver
 from hardware.scip_settings import ScipSettings
-from hardware.scip_sweep import Parameters, decode_sweep
+from hardware.scip_sweep import Parameters, Sweep, decode_sweep
 from passpmp_ti.scan import Scan
 
 SETTLED = 1.0
@@ -67,6 +67,8 @@ class Session:
         self.version: dict[str, str] = {}
         self.state: dict[str, str] = {}
         self.parameters: Parameters | None = None
+        self.sweep: Sweep | None = None
+        """The newest one, as it came."""
         self.since = math.inf
         """When the first sweep came [s]; inf before."""
         self._settings = settings
@@ -239,6 +241,7 @@ class Session:
                 self._count_garbled(error)
                 return
             self._garbled_in_row = 0
+            self.sweep = sweep
             scan = receiver.take(sweep, at)
             self.since = min(self.since, at)
             if scan is not None:

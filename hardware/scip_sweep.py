@@ -206,18 +206,18 @@ def ranges_of(
     ranges = distances / 1000.0
     ranges[ranges >= range_max] = np.inf
     coded = (distances < parameters.nearest) | (distances >= FIRST_CODE)
-    ranges[coded] = np.nan
-    ranges[coded & np.isin(distances, codes.no_return)] = np.inf
-    ranges[coded & np.isin(distances, codes.too_near)] = AT_THE_SENSOR
+    told = distances[coded]
+    meant = np.full(len(told), np.nan)
+    meant[np.isin(told, codes.no_return)] = np.inf
+    meant[np.isin(told, codes.too_near)] = AT_THE_SENSOR
+    ranges[coded] = meant
     return ranges
 
 
 def distances_of(ranges: np.ndarray, parameters: Parameters, codes: Codes) -> np.ndarray:
     """What a device would tell of ranges [m] as a `Scan` means them: [n] int64 [mm] or codes."""
-    lost = np.isnan(ranges)
     mm = np.rint(np.where(np.isfinite(ranges), ranges, 0.0) * 1000.0).astype(np.int64)
-    near = codes.too_near[0] if codes.too_near else codes.lost[0]
-    mm[mm < parameters.nearest] = near
+    mm[mm < parameters.nearest] = (codes.too_near or codes.lost)[0]
     mm[ranges * 1000.0 > parameters.farthest] = codes.no_return[0]
-    mm[lost] = codes.lost[0]
+    mm[~(ranges > 0)] = codes.lost[0]
     return mm

@@ -1,4 +1,4 @@
-"""Scans that real range finders saw go through emulator and client unchanged."""
+"""Scans of real and of simulated range finders go through emulator and client unchanged."""
 
 import gzip
 import os
@@ -14,6 +14,9 @@ from hardware.scip_settings import ScipSettings
 from hardware.scip_sweep import URG_04LX, URG_CODES, UST_CODES, Parameters
 from hardware.scip_wire import Wire
 from passpmp_ti.sim.data_files import DATA, REPOSITORY
+from passpmp_ti.sim.lidar import Lidar
+from passpmp_ti.sim.movers import PathMovers
+from passpmp_ti.sim.world import World
 
 RECORDED = Path(os.environ.get(DATA, REPOSITORY.parent / "shared" / "data"))
 SCANS = 60
@@ -69,3 +72,25 @@ def test_scans_of_a_hokuyo_arrive_number_by_number():
     meant[(seen > 0) & (seen < 20)] = np.nan
     assert np.isinf(meant).mean() > 0.3
     assert np.array_equal(came, meant, equal_nan=True)
+
+
+def test_the_simulated_range_finder_is_seen_over_the_wire_as_it_is_without():
+    # somebody walks by at 1 m/s while the device turns
+    way = np.array([[0.0, 2.0, -2.0], [4.0, 2.0, 2.0]])
+    world = World((-8.0, -8.0, 8.0, 8.0), movers=PathMovers([way], np.array([0.3])))
+    lidar = Lidar(range_max=10.0, beams=1081, field_of_view=np.radians(270))
+    shown = []
+
+    def source(begin):
+        shown.append(lidar.scan(world, np.zeros(3), begin))
+        return shown[-1].ranges
+
+    device = Device(source, 0.0)
+    scans = Wire(Session(ScipSettings(host="127.0.0.1"), 0.0), device, 0.0).run(1.0)
+    assert len(scans) > 35
+    for came, seen in zip(scans, shown, strict=True):
+        assert np.allclose(came.ranges, seen.ranges, rtol=0, atol=0.5e-3 + 1e-9)
+        assert np.allclose(came.bearings, seen.bearings)
+        assert came.range_max == seen.range_max
+        # the last beam is measured three quarters of a turn later, and the stamp is no earlier
+        assert 0.01875 <= came.stamp - seen.stamp < 0.03
