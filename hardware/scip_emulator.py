@@ -23,7 +23,7 @@ LONGEST_WAIT = 0.05
 class Emulator:
     """Serves one host at a time, from a thread of its own.
 
-    with Emulator(lambda when: ranges) as emulator:
+    with Emulator(lambda now: Device(source, now)) as emulator:
         host, port = emulator.address
     """
 
