@@ -126,8 +126,10 @@ def touch_along(
     control,
     direction,
     steps,
+    most,
 ):
-    """What object n adds to TOUCH along a motion; see kernels/risk.py.
+    """What object n adds to TOUCH along a motion, followed until that is more than `most`; see
+    kernels/risk.py.
 
     Rests begin and end what is counted: there, half the chance to be touching is added.
     """
@@ -162,7 +164,7 @@ def touch_along(
         before = after
         q = ahead
         tick += taken * counts[4]
-        going = taken > 0
+        going = taken > 0 and total <= most
     return total
 
 
@@ -250,7 +252,7 @@ def weigh_children(
                         ):
                             total += touch_along(
                                 kind, numbers, counts, robot, windows, places, slots, near, pool,
-                                odds, tally, n, q, tick, control, direction, count,
+                                odds, tally, n, q, tick, control, direction, count, bound - total,
                             )  # fmt: skip
                         else:
                             total += counts[5] * odds[2] * seconds
