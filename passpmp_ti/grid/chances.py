@@ -244,6 +244,12 @@ def rasterised(parts: Parts) -> tuple[device.Array, device.Array, device.Array]:
     pool = device.empty((max(total, 1) * CHANNELS,), np.float32)
     there = device.put(places)
     if total:
-        scratch = device.empty((WORKERS * SCRATCH,), np.float32)
+        scratch = scratch_memory(device.resident())
         rasterise_windows(device.share(), WORKERS, there, device.put(shapes), scratch, pool)
     return device.put(rows), there, pool
+
+
+@functools.cache
+def scratch_memory(resident: bool) -> device.Array:
+    """What the workers of `rasterise_windows` write on; as `device.resident` tells."""
+    return device.empty((WORKERS * SCRATCH,), np.float32)

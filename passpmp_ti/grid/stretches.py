@@ -6,7 +6,7 @@ docs/risk.md derives the bounds that are used here.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Protocol
 
 import numpy as np
@@ -96,47 +96,56 @@ class Parts:
 
 @dataclass(frozen=True, slots=True)
 class Shape:
-    """Gaussians of places, blurred where they are too sharp."""
+    """Gaussians of places, blurred where they are too sharp; all arrays are of one shape.
 
-    frame: np.ndarray
-    """[..., 2, 2], rows are the principal axes."""
-    deviation: np.ndarray
-    """[..., 2] along them, the greater first [m]."""
+    Written out for two dimensions: NumPy takes ten times as long for stacks of small matrices.
+    """
+
+    xx: np.ndarray
+    """Covariance, noise included, as `yy` and `xy` [m^2]."""
+    yy: np.ndarray
+    xy: np.ndarray
+    c: np.ndarray
+    """Cosine and sine (`s`) of the principal axis of the greater deviation."""
+    s: np.ndarray
+    great: np.ndarray
+    """Standard deviations along the principal axes [m]."""
+    least: np.ndarray
     noise: np.ndarray
-    """[...] standard deviation of what they are blurred by [m]."""
-    covariance: np.ndarray
-    """[..., 2, 2] with the noise."""
+    """Standard deviation of what they are blurred by [m]."""
 
     @classmethod
     def of(cls, covariance: np.ndarray, radius: np.ndarray) -> Shape:
-        """Of [..., 2, 2] covariances, about discs of `radius` [...]."""
+        """Of [..., 4, 4] covariances, about discs of `radius` [...]."""
         xx, yy, xy = covariance[..., 0, 0], covariance[..., 1, 1], covariance[..., 0, 1]
-        gap = np.hypot(0.5 * (xx - yy), xy)
         middle = 0.5 * (xx + yy)
-        # the product of both is the determinant: a difference would lose the smaller one
-        greater = middle + gap
+        greater = middle + np.hypot(0.5 * (xx - yy), xy)
+        # both make the determinant; their difference would lose the smaller one
         smaller = np.maximum(xx * yy - xy * xy, 0.0) / greater
-        noise = np.sqrt(np.maximum((radius / SHARPEST) ** 2 - smaller, 0.0))
+        square = np.maximum((radius / SHARPEST) ** 2 - smaller, 0.0)
         angle = 0.5 * np.arctan2(2 * xy, xx - yy)
-        c, s = np.cos(angle), np.sin(angle)
-        frame = np.stack([np.stack([c, s], -1), np.stack([-s, c], -1)], -2)
-        deviation = np.sqrt(np.stack([greater, smaller], -1) + noise[..., None] ** 2)
-        blurred = covariance + noise[..., None, None] ** 2 * np.eye(2)
-        return cls(frame, deviation, noise, blurred)
-
-    def whitened(self, matrix: np.ndarray) -> np.ndarray:
-        """[..., 2, 2] `matrix` as seen from where these Gaussians are standard normal ones."""
-        root = self.frame / self.deviation[..., None]
-        return root @ matrix @ np.swapaxes(root, -1, -2)
+        return cls(
+            xx + square, yy + square, xy, np.cos(angle), np.sin(angle),
+            np.sqrt(greater + square), np.sqrt(smaller + square), np.sqrt(square),
+        )  # fmt: skip
 
     def moments(self, some: slice) -> Shape:
-        """Those of some of M moments, where the axes are [..., M]."""
-        return Shape(
-            self.frame[..., some, :, :],
-            self.deviation[..., some, :],
-            self.noise[..., some],
-            self.covariance[..., some, :, :],
+        """Those of some of the last axis."""
+        return Shape(*(getattr(self, f.name)[..., some] for f in fields(self)))
+
+    def along(self, xx: np.ndarray, yy: np.ndarray, xy: np.ndarray) -> tuple[np.ndarray, ...]:
+        """(xx, yy, xy) of symmetric matrices in the frames of the principal axes."""
+        cc, ss, cs = self.c * self.c, self.s * self.s, self.c * self.s
+        return (
+            cc * xx + ss * yy + 2 * cs * xy,
+            ss * xx + cc * yy - 2 * cs * xy,
+            cs * (yy - xx) + (cc - ss) * xy,
         )
+
+    def whitened(self, xx: np.ndarray, yy: np.ndarray, xy: np.ndarray) -> tuple[np.ndarray, ...]:
+        """The same as seen from where these Gaussians are standard normal ones."""
+        xx, yy, xy = self.along(xx, yy, xy)
+        return xx / self.great**2, yy / self.least**2, xy / (self.great * self.least)
 
 
 def cut(
@@ -153,10 +162,10 @@ def cut(
     objects, components = forecast.weight.shape
     layers = len(forecast.times)
     length = (forecast.times[-1] - forecast.times[0]) / (layers - 1)
-    shape = Shape.of(forecast.covariance[..., :2, :2], radius[:, None, None])
-    bends, _ = _bends(shape, forecast.covariance[..., 2:, 2:], length)
+    shape = Shape.of(forecast.covariance, radius[:, None, None])
+    bends, _ = _bends(shape, forecast.covariance, length)
     far = _farness(forecast.mean, forecast.covariance, shape, radius[:, None, None], reach)
-    wanted = _within_reach(forecast, far * shape.deviation[..., 0], radius, reach)
+    wanted = _within_reach(forecast, far * shape.great, radius, reach)
     counts = np.where(wanted, np.clip(np.ceil(bends / BEND), 1, MOST_PARTS), 1).astype(np.int64)
 
     # a chain of stretches, one for each component of an object, ends with a row of its own
@@ -175,13 +184,13 @@ def cut(
         chain, layer, share, length,
     )  # fmt: skip
     size = radius[chain // components]
-    shape = Shape.of(covariance[:, :2, :2], size)
+    shape = Shape.of(covariance, size)
     far = _farness(mean, covariance, shape, size, reach)
     # of the part that begins with a row; the last of a chain begins none
     duration = length / chained.ravel()[cell]
     last = layer == layers - 1
     rows = _rows(mean, covariance, shape, size, anchor)
-    bends, monotone = _bends(shape, covariance[:, 2:, 2:], duration[:-1])
+    bends, monotone = _bends(shape, covariance, duration[:-1])
     _finish(rows, shape, size, far, bends, monotone, duration, last, reach)
     rows[:, 20] *= forecast.weight.ravel()[chain]
     part = np.where(last, False, np.pad(there, ((0, 0), (0, 1))).ravel()[cell])
@@ -194,43 +203,46 @@ def cut(
         slots.astype(np.int32),
         near.astype(np.float32),
         wanted_rows,
-        shape.deviation,
+        np.stack([shape.great, shape.least], -1),
         size + BLUR * shape.noise,
         float(forecast.weight[forecast.weight < SMALLEST].sum()),
     )
 
 
 def _bends(
-    shape: Shape, velocities: np.ndarray, length: np.ndarray | float
+    shape: Shape, covariance: np.ndarray, length: np.ndarray | float
 ) -> tuple[np.ndarray, np.ndarray]:
     """How strongly densities are bent from each moment to the next, and whether they only widen.
 
     Along a time in which the covariance goes at a constant rate S and bends as Pvv makes it, a
-    Gaussian has f'' >= -k f, all in the frame in which it is standard normal.
+    Gaussian has f'' >= -k f; k is worked out in the frame in which it is standard normal.
 
     Args:
-        shape: of [..., M] moments.
-        velocities: [..., M, 2, 2] their covariances of velocity.
-        length: [...] from each to the next [s].
+        shape: of M moments along the last axis.
+        covariance: [..., M, 4, 4] of theirs.
+        length: [..., M - 1] from each to the next [s].
 
     Returns:
         [..., M - 1] half of the length times the root of k; [..., M - 1] bool.
     """
-    before, after = shape.moments(slice(None, -1)), shape.moments(slice(1, None))
-    rate = (after.covariance - before.covariance) / np.asarray(length)[..., None, None]
-    strongest = np.zeros(rate.shape[:-2])
-    monotone = np.ones(rate.shape[:-2], dtype=bool)
-    for at, pvv in ((before, velocities[..., :-1, :, :]), (after, velocities[..., 1:, :, :])):
-        s = at.whitened(rate)
-        middle = 0.5 * (s[..., 0, 0] + s[..., 1, 1])
-        gap = np.hypot(0.5 * (s[..., 0, 0] - s[..., 1, 1]), s[..., 0, 1])
+    strongest = np.zeros(1)
+    monotone = np.ones(1, dtype=bool)
+    ends = slice(None, -1), slice(1, None)
+    before, after = (shape.moments(end) for end in ends)
+    rate = tuple(
+        (getattr(after, name) - getattr(before, name)) / length for name in ("xx", "yy", "xy")
+    )
+    for at, end in zip((before, after), ends, strict=True):
+        xx, yy, xy = at.whitened(*rate)
+        middle = 0.5 * (xx + yy)
+        gap = np.hypot(0.5 * (xx - yy), xy)
         up, down = np.maximum(middle + gap, 0.0), np.maximum(gap - middle, 0.0)
-        trace = 2 * np.maximum(middle, 0.0)
-        own = up**2 + up * trace - middle**2 - gap**2
-        own = own + 2 * down * (up + down) * FARTHEST**2
-        own = own + np.trace(at.whitened(pvv), axis1=-2, axis2=-1)
-        strongest = np.maximum(strongest, own)
-        monotone &= down * length < 1e-3
+        own = up**2 + 2 * up * np.maximum(middle, 0.0) - middle**2 - gap**2
+        own += 2 * down * (up + down) * FARTHEST**2
+        pvv = covariance[..., end, 2:, 2:]
+        xx, yy, _ = at.whitened(pvv[..., 0, 0], pvv[..., 1, 1], pvv[..., 0, 1])
+        strongest = np.maximum(strongest, own + xx + yy)
+        monotone = monotone & (down * length < 1e-3)
     return 0.5 * length * np.sqrt(strongest), monotone
 
 
@@ -240,8 +252,8 @@ def _farness(
     """[...] standard deviations beyond which an object may be left out."""
     # how fast it may come, as the root of the mean square
     speed = np.hypot(mean[..., 2], mean[..., 3]) + reach.top_speed
-    speed = speed + np.sqrt(np.trace(covariance[..., 2:, 2:], axis1=-2, axis2=-1)) * 8
-    rate = (radius + BLUR * shape.noise) * speed / shape.deviation.prod(axis=-1)
+    speed += 8 * np.sqrt(covariance[..., 2, 2] + covariance[..., 3, 3])
+    rate = (radius + BLUR * shape.noise) * speed / (shape.great * shape.least)
     return np.sqrt(2 * np.log(np.maximum(rate / LEFT_OUT, math.e)))
 
 
@@ -307,22 +319,31 @@ def _rows(
     """[W, 22] what is known of each moment for itself."""
     rows = np.zeros((len(mean), ROW))
     rows[:, :2] = mean[:, :2] - np.array(anchor)
-    rows[:, 2:4] = shape.frame[:, 0]
-    turned = shape.frame @ covariance[:, 2:, :2] @ np.swapaxes(shape.frame, 1, 2)
-    gain = turned / shape.deviation[:, None, :] ** 2
-    rest = shape.frame @ covariance[:, 2:, 2:] @ np.swapaxes(shape.frame, 1, 2)
-    rest = rest - gain @ np.swapaxes(turned, 1, 2)
-    rows[:, 8:10] = np.einsum("wij,wj->wi", shape.frame, mean[:, 2:])
-    rows[:, 10:14] = gain.reshape(-1, 4)
+    c, s = shape.c, shape.s
+    rows[:, 2], rows[:, 3] = c, s
+    rows[:, 8] = c * mean[:, 2] + s * mean[:, 3]
+    rows[:, 9] = c * mean[:, 3] - s * mean[:, 2]
+    # K = P_vx P_xx^-1 and what it leaves of P_vv, in the frame in which P_xx is diagonal
+    x0 = c * covariance[:, 2, 0] + s * covariance[:, 3, 0]
+    x1 = c * covariance[:, 2, 1] + s * covariance[:, 3, 1]
+    y0 = c * covariance[:, 3, 0] - s * covariance[:, 2, 0]
+    y1 = c * covariance[:, 3, 1] - s * covariance[:, 2, 1]
+    px, py, qx, qy = c * x0 + s * x1, c * x1 - s * x0, c * y0 + s * y1, c * y1 - s * y0
+    k = np.stack([px, py, qx, qy], -1) / np.stack([shape.great, shape.least] * 2, -1) ** 2
+    rows[:, 10:14] = k
     size = radius + BLUR * shape.noise
-    rows[:, 14] = 0.5 * (gain[:, 0, 0] + gain[:, 1, 1]) * size
-    rows[:, 15] = size * np.hypot(
-        0.5 * (gain[:, 0, 0] - gain[:, 1, 1]), 0.5 * (gain[:, 0, 1] + gain[:, 1, 0])
+    rows[:, 14] = 0.5 * (k[:, 0] + k[:, 3]) * size
+    rows[:, 15] = size * np.hypot(0.5 * (k[:, 0] - k[:, 3]), 0.5 * (k[:, 1] + k[:, 2]))
+    xx, yy, xy = shape.along(covariance[:, 2, 2], covariance[:, 3, 3], covariance[:, 2, 3])
+    xx, yy, xy = (
+        xx - k[:, 0] * px - k[:, 1] * py,
+        yy - k[:, 2] * qx - k[:, 3] * qy,
+        xy - k[:, 0] * qx - k[:, 1] * qy,
     )
     # E|a| of a normal number is at most the root of mean^2 + (2 / pi) variance
-    rows[:, 16] = 2 / math.pi * np.maximum(rest[:, 0, 0], 0.0)
-    rows[:, 17] = 2 / math.pi * rest[:, 0, 1]
-    rows[:, 18] = 2 / math.pi * np.maximum(rest[:, 1, 1], 0.0)
+    rows[:, 16] = 2 / math.pi * np.maximum(xx, 0.0)
+    rows[:, 17] = 2 / math.pi * xy
+    rows[:, 18] = 2 / math.pi * np.maximum(yy, 0.0)
     return rows
 
 
@@ -340,11 +361,12 @@ def _finish(
     """Fill in what rows say of the parts that begin with them."""
     # a sample speaks for places that a disc comes to in half its length
     slack = 0.5 * reach.span * (reach.top_speed + np.hypot(rows[:, 8], rows[:, 9]))
-    rows[:, 6:8] = (radius + BLUR * shape.noise + slack)[:, None] + far[:, None] * shape.deviation
     noise = shape.noise
+    rows[:, 6] = radius + BLUR * noise + slack + far * shape.great
+    rows[:, 7] = radius + BLUR * noise + slack + far * shape.least
     blurred = noise > 0
     blurred[:-1] |= noise[1:] > 0
-    least = shape.deviation[:, 1].copy()
+    least = shape.least.copy()
     least[:-1] = np.minimum(least[:-1], least[1:])
     rows[:, 19] = 0.5 / least
     # noise that fades as the covariance grows moves what it blurs
@@ -353,7 +375,7 @@ def _finish(
     rows[:, 20] = np.where(blurred, 1 / (1 - math.exp(-0.5 * BLUR**2)), 1.0)
     steep = bends > STEEPEST
     rows[:-1, 20] /= np.cos(np.where(steep, 0.0, bends))
-    volume = shape.deviation.prod(axis=1)
+    volume = shape.great * shape.least
     leap = np.where(monotone, volume[1:] / volume[:-1], LOST)
     rows[:-1, 21] = np.where(steep & ~last[:-1], leap, 0.0)
 
