@@ -15,8 +15,6 @@ SHAPE_ERROR = 0.1
 """Standard deviation of a centre, since bodies are no discs [object widths]."""
 HIDDEN_ERROR = 0.5
 """Likewise where an end of the body is hidden [radii]."""
-ROUND_UP = 1.0 + 1e-9
-"""Discs are said to be this much larger, so that no rounding leaves a return outside."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,11 +92,11 @@ class Detections:
         np.maximum.at(body, self.group, visible)
         return mean, np.sqrt(best), body
 
-    def reach(self, centre: np.ndarray) -> np.ndarray:
-        """[d] radius of the disc about each centre [d, 2] that holds its object's returns [m]."""
-        found = np.zeros(self.count)
-        np.maximum.at(found, self.owner, np.hypot(*(self.points - centre[self.owner]).T))
-        return found * ROUND_UP
+    def clear(self) -> np.ndarray:
+        """[d] bool: some sensor sees both ends of the object."""
+        found = np.zeros(self.count, dtype=bool)
+        np.logical_or.at(found, self.group, self.whole.all(axis=1))
+        return found
 
 
 def detect(sightings: Sequence[Sighting], settings: Settings) -> Detections:
