@@ -11,7 +11,7 @@ from passpmp_ti.settings import Settings
 from passpmp_ti.tracking.segments import longest, segments_of
 from passpmp_ti.tracking.sighting import Sighting
 
-SHAPE_ERROR = 0.1
+SHAPE_ERROR = 0.07
 """Standard deviation of a centre, since bodies are no discs [object widths]."""
 HIDDEN_ERROR = 0.5
 """Likewise where an end of the body is hidden [radii]."""

@@ -29,8 +29,8 @@ class Mode:
 
 MODES = (
     Mode("still", settling=0.3, restlessness=0.002, stays=4.0),
-    Mode("walking", settling=np.inf, restlessness=0.002, stays=4.0),
-    Mode("turning", settling=np.inf, restlessness=0.03, stays=1.0),
+    Mode("walking", settling=np.inf, restlessness=0.0007, stays=4.0),
+    Mode("turning", settling=np.inf, restlessness=0.012, stays=1.0),
 )
 SWITCH = np.array([[0.0, 0.5, 0.5], [0.3, 0.0, 0.7], [0.2, 0.8, 0.0]])
 """[C, C] where a mode that ends goes on."""

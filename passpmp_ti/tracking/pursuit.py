@@ -216,7 +216,8 @@ def _met(
     np.maximum.at(reach, owner, np.hypot(*(found.points - kept.last_centre[owner]).T))
     kept.last_radius[tracks] = reach[tracks] * ROUND_UP
     now = np.maximum(kept.last_radius[tracks], body[chief])
-    gone = min((stamp - before) / SHRINK, 1.0)
+    # what is seen from side to side is as large as it seems; of the rest memory tells more
+    gone = np.where(clear, 1.0, min((stamp - before) / SHRINK, 1.0))
     kept.radius[tracks] = np.maximum(now, kept.radius[tracks] * (1.0 - gone) + now * gone)
     known = kept.existence[tracks]
     kept.existence[tracks] = np.minimum(1.0 - 0.2 * (1.0 - known), SURE)
