@@ -83,14 +83,15 @@ class Detections:
         variance += np.where(hidden, (HIDDEN_ERROR * visible) ** 2, 0.0)
         weight = 1.0 / variance
         total = np.bincount(self.group, weight, self.count)
-        mean = np.stack(
-            [np.bincount(self.group, weight * c, self.count) / total for c in centre.T], axis=1
+        mean, body = (
+            np.stack(
+                [np.bincount(self.group, weight * c, self.count) / total for c in columns], axis=1
+            )
+            for columns in (centre.T, visible[None])
         )
         best = np.full(self.count, np.inf)
         np.minimum.at(best, self.group, variance)
-        body = np.zeros(self.count)
-        np.maximum.at(body, self.group, visible)
-        return mean, np.sqrt(best), body
+        return mean, np.sqrt(best), body[:, 0]
 
     def clear(self) -> np.ndarray:
         """[d] bool: some sensor sees both ends of the object."""

@@ -78,7 +78,7 @@ def follow(
     next_id = before.next_id if before is not None else 0
     kept = kept.joined(len(fresh), next_id, stamp)
     next_id += len(fresh)
-    kept = _met(kept, found, track, centre, body, stamp, old.stamp if old else stamp)
+    kept = _met(kept, found, track, centre, deviation, body, stamp, old.stamp if old else stamp)
 
     unmet = np.flatnonzero(~kept.seen)
     share = seen_empty(bank.combined()[0][unmet, :2], kept.radius[unmet], sightings)
@@ -195,6 +195,7 @@ def _met(
     found: Detections,
     track: np.ndarray,
     centre: np.ndarray,
+    deviation: np.ndarray,
     body: np.ndarray,
     stamp: float,
     before: float,
@@ -215,7 +216,8 @@ def _met(
     owner = track[found.owner]
     np.maximum.at(reach, owner, np.hypot(*(found.points - kept.last_centre[owner]).T))
     kept.last_radius[tracks] = reach[tracks] * ROUND_UP
-    now = np.maximum(kept.last_radius[tracks], body[chief])
+    # the centre's own error is in the covariance already
+    now = np.maximum(kept.last_radius[tracks] - deviation[chief], body[chief])
     # what is seen from side to side is as large as it seems; of the rest memory tells more
     gone = np.where(clear, 1.0, min((stamp - before) / SHRINK, 1.0))
     kept.radius[tracks] = np.maximum(now, kept.radius[tracks] * (1.0 - gone) + now * gone)
