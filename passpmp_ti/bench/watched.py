@@ -148,8 +148,9 @@ def promises(
 ) -> Iterator[Promises]:
     """Ask a forecast at each of its times about discs at random places.
 
-    The places are drawn about the prediction, twice as wide as it is, and the discs from 0.1 to 3 m
-    large, so that chances from 0 to 1 come up at every horizon. The truth has no part in the draw.
+    The discs are 0.1 to 3 m large and lie about where they would just touch the object in one of
+    the mixture's means, off by its spread, so that chances from 0 to 1 come up at every horizon.
+    The truth has no part in the draw.
 
     Args:
         forecast: of N tracks at L times.
@@ -167,10 +168,11 @@ def promises(
         kind = np.minimum(chosen.sum(axis=1), kinds - 1)
         mean = forecast.mean[:, :, step, :2]
         covariance = forecast.covariance[:, :, step, :2, :2]
-        wide = np.linalg.cholesky(covariance[n, kind])
-        draw = generator.normal(size=(len(n), 2))
-        place = mean[n, kind] + 2.0 * np.einsum("qde,qe->qd", wide, draw)
+        wide = np.sqrt(np.linalg.eigvalsh(covariance[n, kind])[:, 1])
         disc = np.exp(generator.uniform(np.log(0.1), np.log(3.0), len(n)))
+        apart = disc + forecast.radius[n] + 1.5 * wide * generator.normal(size=len(n))
+        way = generator.uniform(0.0, 2 * np.pi, len(n))
+        place = mean[n, kind] + apart[:, None] * np.stack([np.cos(way), np.sin(way)], axis=1)
         chance = touch_chance(
             forecast.weight[n], mean[n], covariance[n], place, disc + forecast.radius[n]
         )

@@ -11,12 +11,10 @@ from passpmp_ti.settings import Settings
 from passpmp_ti.tracking.segments import longest, segments_of
 from passpmp_ti.tracking.sighting import Sighting
 
-SHAPE_ERROR = 0.1
+SHAPE_ERROR = 0.07
 """Standard deviation of a centre, since bodies are no discs [object widths]."""
 HIDDEN_ERROR = 0.5
 """Likewise where an end of the body is hidden [radii]."""
-ROUND_UP = 1.0 + 1e-9
-"""Discs are said to be this much larger, so that no rounding leaves a return outside."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,20 +83,21 @@ class Detections:
         variance += np.where(hidden, (HIDDEN_ERROR * visible) ** 2, 0.0)
         weight = 1.0 / variance
         total = np.bincount(self.group, weight, self.count)
-        mean = np.stack(
-            [np.bincount(self.group, weight * c, self.count) / total for c in centre.T], axis=1
+        mean, body = (
+            np.stack(
+                [np.bincount(self.group, weight * c, self.count) / total for c in columns], axis=1
+            )
+            for columns in (centre.T, visible[None])
         )
         best = np.full(self.count, np.inf)
         np.minimum.at(best, self.group, variance)
-        body = np.zeros(self.count)
-        np.maximum.at(body, self.group, visible)
-        return mean, np.sqrt(best), body
+        return mean, np.sqrt(best), body[:, 0]
 
-    def reach(self, centre: np.ndarray) -> np.ndarray:
-        """[d] radius of the disc about each centre [d, 2] that holds its object's returns [m]."""
-        found = np.zeros(self.count)
-        np.maximum.at(found, self.owner, np.hypot(*(self.points - centre[self.owner]).T))
-        return found * ROUND_UP
+    def clear(self) -> np.ndarray:
+        """[d] bool: some sensor sees both ends of the object."""
+        found = np.zeros(self.count, dtype=bool)
+        np.logical_or.at(found, self.group, self.whole.all(axis=1))
+        return found
 
 
 def detect(sightings: Sequence[Sighting], settings: Settings) -> Detections:

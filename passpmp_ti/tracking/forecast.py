@@ -125,9 +125,10 @@ def forecast(
             radius=radius,
         )
     # whole microseconds: steps that differ by rounding are one, and need no new matrices
-    F, Q = modes.propagation(tuple(np.round(steps, 6).tolist()), speed)
+    F, Q = modes.propagation(tuple(np.round(steps, 6).tolist()))
+    pace = modes.pace(*bank.combined(), speed)[:, None, None, None, None]
     mean = (F @ bank.mean[:, :, None, :, None])[..., 0]
-    covariance = F @ bank.covariance[:, :, None] @ F.swapaxes(-1, -2) + Q
+    covariance = F @ bank.covariance[:, :, None] @ F.swapaxes(-1, -2) + pace**2 * Q
     _narrow(covariance, bank.covariance, times - stamp, speed)
     return Forecast(
         times=times, weight=bank.weight, mean=mean, covariance=covariance, radius=radius

@@ -71,7 +71,7 @@ def born(centre: np.ndarray, deviation: np.ndarray, speed: float) -> Bank:
         spread = (0.5 * max(speed, modes.SLOWEST)) ** 2
         if np.isfinite(mode.settling):
             # what the noise and the settling come to in the long run
-            spread = 0.5 * mode.restlessness * mode.settling * max(speed, modes.SLOWEST) ** 2
+            spread *= 2.0 * mode.restlessness * mode.settling
         covariance[:, c, [2, 3], [2, 3]] = spread
     return Bank(mean, covariance, np.tile(modes.START, (count, 1)))
 
@@ -79,7 +79,8 @@ def born(centre: np.ndarray, deviation: np.ndarray, speed: float) -> Bank:
 def predicted(bank: Bank, dt: float, speed: float) -> Bank:
     """The tracks a step of dt [s] later: modes mixed, then each mode's own motion."""
     switching = modes.switching(dt)
-    F, Q = modes.matrices(dt, speed)
+    F, Q = modes.matrices(dt)
+    pace = modes.pace(*bank.combined(), speed)[:, None, None, None]
     weight = bank.weight @ switching
     share = bank.weight[:, :, None] * switching / weight[:, None, :]  # [N, from, to]
     mean = np.einsum("nij,nid->njd", share, bank.mean)
@@ -87,7 +88,7 @@ def predicted(bank: Bank, dt: float, speed: float) -> Bank:
     covariance = np.einsum("nij,nide->njde", share, bank.covariance)
     covariance += np.einsum("nij,nijd,nije->njde", share, off, off)
     mean = np.einsum("cde,nce->ncd", F, mean)
-    return Bank(mean, F @ covariance @ F.swapaxes(-1, -2) + Q, weight)
+    return Bank(mean, F @ covariance @ F.swapaxes(-1, -2) + pace**2 * Q, weight)
 
 
 def updated(bank: Bank, centre: np.ndarray, deviation: np.ndarray, speed: float) -> Bank:

@@ -11,6 +11,8 @@ from filterpy.kalman import KalmanFilter
 
 SLOWEST = 0.01
 """Where a bound of 0 says that nothing moves, noises are those of this bound [m/s]."""
+CALM = 0.2
+"""Noises are at least those of an object at this share of the speed bound: who stands may start."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,16 +23,16 @@ class Mode:
     settling: float
     """Time constant in which the velocity dies away [s]; inf: constant velocity."""
     restlessness: float
-    """Spectral density of the acceleration's noise, as a share of the speed bound squared:
-    [1 / s], times (m/s)^2."""
+    """Spectral density of the acceleration's noise over the square of the object's own pace [1/s]:
+    who is twice as fast changes his velocity twice as much."""
     stays: float
     """How long the mode lasts, on average [s]."""
 
 
 MODES = (
-    Mode("still", settling=0.3, restlessness=0.002, stays=4.0),
-    Mode("walking", settling=np.inf, restlessness=0.002, stays=4.0),
-    Mode("turning", settling=np.inf, restlessness=0.03, stays=1.0),
+    Mode("still", settling=0.3, restlessness=0.03, stays=4.0),
+    Mode("walking", settling=np.inf, restlessness=0.008, stays=4.0),
+    Mode("turning", settling=np.inf, restlessness=0.13, stays=1.0),
 )
 SWITCH = np.array([[0.0, 0.5, 0.5], [0.3, 0.0, 0.7], [0.2, 0.8, 0.0]])
 """[C, C] where a mode that ends goes on."""
@@ -38,13 +40,25 @@ START = np.array([0.2, 0.4, 0.4])
 """[C] chances of the modes of something just met."""
 
 
-@functools.lru_cache(maxsize=4096)
-def filters(dt: float, speed: float) -> tuple[KalmanFilter, ...]:
+def pace(mean: np.ndarray, covariance: np.ndarray, speed: float) -> np.ndarray:
+    """[N] root mean square of each object's speed, between `CALM` of the bound and the bound [m/s].
+
+    Args:
+        mean: [N, 4] all modes together.
+        covariance: [N, 4, 4].
+        speed: bound on every object's speed [m/s].
+    """
+    speed = max(speed, SLOWEST)
+    square = mean[:, 2] ** 2 + mean[:, 3] ** 2 + covariance[:, 2, 2] + covariance[:, 3, 3]
+    return np.clip(np.sqrt(square), CALM * speed, speed)
+
+
+def filters(dt: float, pace: float = 1.0) -> tuple[KalmanFilter, ...]:
     """One filterpy filter a mode, its F, Q and H made for a step.
 
     Args:
         dt: of the step [s].
-        speed: bound on every object's speed [m/s].
+        pace: of the object [m/s]; Q is proportional to its square.
     """
     found = []
     for mode in MODES:
@@ -54,7 +68,7 @@ def filters(dt: float, speed: float) -> tuple[KalmanFilter, ...]:
         if np.isfinite(mode.settling):
             drift[2:, 2:] = -np.eye(2) / mode.settling
         noise = np.zeros((4, 2))
-        noise[2:] = np.eye(2) * np.sqrt(mode.restlessness) * max(speed, SLOWEST)
+        noise[2:] = np.eye(2) * np.sqrt(mode.restlessness) * pace
         filter_.F, Q = van_loan_discretization(drift, noise, dt)
         filter_.Q = 0.5 * (Q + Q.T)
         filter_.H = np.eye(2, 4)
@@ -63,9 +77,9 @@ def filters(dt: float, speed: float) -> tuple[KalmanFilter, ...]:
 
 
 @functools.lru_cache(maxsize=4096)
-def matrices(dt: float, speed: float) -> tuple[np.ndarray, np.ndarray]:
-    """F [C, 4, 4] and Q [C, 4, 4] of `filters`."""
-    modes = filters(dt, speed)
+def matrices(dt: float) -> tuple[np.ndarray, np.ndarray]:
+    """F [C, 4, 4] and Q [C, 4, 4] of `filters` at a pace of 1 m/s."""
+    modes = filters(dt)
     return np.stack([m.F for m in modes]), np.stack([m.Q for m in modes])
 
 
@@ -77,17 +91,16 @@ def switching(dt: float) -> np.ndarray:
 
 
 @functools.lru_cache(maxsize=512)
-def propagation(steps: tuple[float, ...], speed: float) -> tuple[np.ndarray, np.ndarray]:
+def propagation(steps: tuple[float, ...]) -> tuple[np.ndarray, np.ndarray]:
     """F [C, L, 4, 4] and Q [C, L, 4, 4] from now to the end of each step, one after the other.
 
     Args:
-        steps: durations [s].
-        speed: bound on every object's speed [m/s].
+        steps: durations [s]; Q is that of a pace of 1 m/s.
     """
     F, Q = np.tile(np.eye(4), (len(MODES), 1, 1)), np.zeros((len(MODES), 4, 4))
     all_F, all_Q = [], []
     for dt in steps:
-        step_F, step_Q = matrices(dt, speed)
+        step_F, step_Q = matrices(dt)
         F = step_F @ F
         Q = step_F @ Q @ step_F.swapaxes(-1, -2) + step_Q
         all_F.append(F)

@@ -23,6 +23,8 @@ BIRTH, SURE, GONE = 0.8, 0.97, 0.2
 """Chance that something just met exists; the greatest that is ever said; that of forgetting."""
 DETECTS = 0.9
 """Chance that an object in plain view is met."""
+ROUND_UP = 1.0 + 1e-9
+"""Discs are said to be this much larger, so that no rounding leaves a return outside."""
 SHRINK = 2.0
 """Time constant in which a radius that was once seen is forgotten [s]."""
 
@@ -64,7 +66,7 @@ def follow(
     met = np.flatnonzero(track >= 0)
     if len(met):
         told = np.full(found.count, np.nan)
-        told[met] = kept.radius[track[met]]
+        told[met] = kept.body[track[met]]
         centre, deviation, body = found.placed(told)
         bank = _with(bank, track[met], imm.updated(
             bank.taken(track[met]), centre[met], deviation[met], speed
@@ -76,7 +78,7 @@ def follow(
     next_id = before.next_id if before is not None else 0
     kept = kept.joined(len(fresh), next_id, stamp)
     next_id += len(fresh)
-    kept = _met(kept, bank, found, track, centre, body, stamp, old.stamp if old else stamp)
+    kept = _met(kept, found, track, centre, deviation, body, stamp, old.stamp if old else stamp)
 
     unmet = np.flatnonzero(~kept.seen)
     share = seen_empty(bank.combined()[0][unmet, :2], kept.radius[unmet], sightings)
@@ -98,6 +100,7 @@ class _Kept:
 
     ids: np.ndarray
     radius: np.ndarray
+    body: np.ndarray
     seen: np.ndarray
     born: np.ndarray
     last_seen: np.ndarray
@@ -109,12 +112,12 @@ class _Kept:
     def of(cls, tracks: Tracks | None) -> _Kept:
         if tracks is None:
             none = np.zeros(0)
-            return cls(
-                none.astype(int), none, none > 0, none, none, np.zeros((0, 2)), none, none.copy()
-            )
+            flat = np.zeros((0, 2))
+            return cls(none.astype(int), none, none, none > 0, none, none, flat, none, none)
         return cls(
             tracks.ids,
             tracks.radius.copy(),
+            tracks.body.copy(),
             np.zeros(len(tracks), dtype=bool),
             tracks.born,
             tracks.last_seen.copy(),
@@ -129,6 +132,7 @@ class _Kept:
         return _Kept(
             np.concatenate([self.ids, next_id + np.arange(count)]),
             np.concatenate([self.radius, zero]),
+            np.concatenate([self.body, np.full(count, np.nan)]),
             np.concatenate([self.seen, zero > 0]),
             np.concatenate([self.born, zero + stamp]),
             np.concatenate([self.last_seen, zero + stamp]),
@@ -188,10 +192,10 @@ def _absorbed(
 
 def _met(
     kept: _Kept,
-    bank: imm.Bank,
     found: Detections,
     track: np.ndarray,
     centre: np.ndarray,
+    deviation: np.ndarray,
     body: np.ndarray,
     stamp: float,
     before: float,
@@ -206,20 +210,17 @@ def _met(
     kept.seen[tracks] = True
     kept.last_seen[tracks] = stamp
     kept.last_centre[tracks] = centre[chief]
+    clear = found.clear()[chief]
+    kept.body[tracks[clear]] = body[chief[clear]]
+    reach = np.zeros(count)
     owner = track[found.owner]
-    for place, radius, least in (
-        (kept.last_centre, kept.last_radius, None),
-        (bank.combined()[0][:, :2], kept.radius, body[chief]),
-    ):
-        reach = np.zeros(count)
-        np.maximum.at(reach, owner, np.hypot(*(found.points - place[owner]).T))
-        now = reach[tracks] * (1.0 + 1e-9)
-        if least is None:
-            radius[tracks] = now
-        else:
-            now = np.maximum(now, least)
-            share = min((stamp - before) / SHRINK, 1.0)
-            radius[tracks] = np.maximum(now, radius[tracks] + share * (now - radius[tracks]))
+    np.maximum.at(reach, owner, np.hypot(*(found.points - kept.last_centre[owner]).T))
+    kept.last_radius[tracks] = reach[tracks] * ROUND_UP
+    # the centre's own error is in the covariance already
+    now = np.maximum(kept.last_radius[tracks] - deviation[chief], body[chief])
+    # what is seen from side to side is as large as it seems; of the rest memory tells more
+    gone = np.where(clear, 1.0, min((stamp - before) / SHRINK, 1.0))
+    kept.radius[tracks] = np.maximum(now, kept.radius[tracks] * (1.0 - gone) + now * gone)
     known = kept.existence[tracks]
     kept.existence[tracks] = np.minimum(1.0 - 0.2 * (1.0 - known), SURE)
     return kept

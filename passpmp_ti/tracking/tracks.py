@@ -24,6 +24,8 @@ class Tracks:
     """What the filters know."""
     radius: np.ndarray
     """[N] disc about the mean place that covers the object, rather too large [m]."""
+    body: np.ndarray
+    """[N] what its radius seemed to be when both its sides were last seen; NaN: never [m]."""
     seen: np.ndarray
     """[N] bool: met in this cycle; the others are coasting."""
     born: np.ndarray
