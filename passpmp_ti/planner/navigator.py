@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -145,7 +146,7 @@ class Navigator:
             # the last cycle's tree goes, and that takes time too
             self.record = record
             budget.close()
-            self.record = replace(record, timings=budget.timings, time_left=budget.left())
+            self.record = record.ended(budget.timings, budget.left())
         return self.held
 
     def _cycle(
@@ -310,10 +311,8 @@ class Navigator:
         if calmed:
             plan = calmest(model, self.held, root, start)
         chosen = self.held if plan is None else plan
-        delay = decision_time(model, chosen, record.stamp, start)
         if plan is not None and budget.late():
             plan, reason, chosen = None, "planning took longer than the deadline", self.held
-            delay = decision_time(model, chosen, record.stamp, start)
         decision = "held" if plan is None or plan is self.held else "brake" if calmed else "new"
         if plan is not None and plan is not self.held:
             self._hold(plan)
@@ -323,7 +322,8 @@ class Navigator:
             risk=risk_of(model, chosen, start),
             tree_nodes=tree.count, tree_depth=tree.depth, tree_stopped_by=tree.stopped_by,
             cost=cost_held if plan is None else cost_new, cost_new=cost_new, cost_held=cost_held,
-            plan_time=max(chosen.end - start, 0.0), decision_time=delay,
+            plan_time=max(chosen.end - start, 0.0),
+            decision_time=partial(decision_time, model, chosen, record.stamp, start),
             particle_leaves=particles, chosen=chosen,
         )  # fmt: skip
 
