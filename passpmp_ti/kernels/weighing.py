@@ -7,14 +7,11 @@ that is allowed is taken: its risk bounds the least one.
 
 import taichi as ti
 
+from passpmp_ti.kernels.chances import vec2
 from passpmp_ti.kernels.check import brakes_clear, control_of, free_steps, robot_of
 from passpmp_ti.kernels.launch import kernel
 from passpmp_ti.kernels.motion import (
     CAR,
-    A,
-    B,
-    C,
-    S,
     X,
     Y,
     at_rest,
@@ -91,54 +88,33 @@ def need_along(
 
 
 @ti.func
-def comes_near(near: ti.template(), odds: ti.template(), tally: ti.template(), n, x, y, way, tick, end):
-    """Whether object n can be near a disc of radius `way` about (x, y) in [tick, end]."""
-    first = ti.cast(ti.max((tick - odds[0]) * odds[1], 0.0), ti.i32)
-    last = ti.min(ti.cast(ti.max((end - odds[0]) * odds[1], 0.0), ti.i32), tally[2] - 1)
-    found = False
-    k = ti.min(first, tally[2] - 1)
-    while k <= last and not found:
-        at = n * tally[2] + k
-        dx = near[at, 0] - x
-        dy = near[at, 1] - y
-        reach = near[at, 2] + way
-        found = dx * dx + dy * dy < reach * reach
-        k += 1
-    return found
-
-
-@ti.func
-def touch_along(
+def lay_way(
     kind: ti.template(),
     numbers: ti.template(),
     counts: ti.template(),
     robot,
-    windows: ti.template(),
-    places: ti.template(),
-    slots: ti.template(),
-    near: ti.template(),
-    pool: ti.template(),
-    odds: ti.template(),
     tally: ti.template(),
-    n,
+    way: ti.template(),
+    base,
     start,
     start_tick,
     control,
     direction,
     steps,
-    most,
 ):
-    """What object n adds to TOUCH along a motion, followed until that is more than `most`; see
-    kernels/risk.py.
+    """(samples of a motion that were written, x, y and radius of a disc that holds their places).
 
-    Rests begin and end what is counted: there, half the chance to be touching is added.
+    Rows of `way`: 0-6 pose, 7 half the time for which the robot moves before the sample, 8 after it
+    [s], 9 tick.
     """
     q = start
     tick = start_tick
-    total = 0.0
     before = 0.0
     k = 0
+    count = 0
     going = True
+    low = vec2(start[X], start[Y])
+    high = low
     while going:
         ahead = q
         taken = 0
@@ -152,19 +128,88 @@ def touch_along(
         after = 0.0
         if moves:
             after = 0.5 * taken * numbers[1]
-        if at_rest(kind, q) and (before > 0.0) != (after > 0.0):
-            total += 0.5 * touched_now(
-                numbers, counts, windows, places, slots, near, pool, odds, tally, n, n + 1, q, tick
-            )
-        if before + after > 0.0:
+        if before + after > 0.0 and count < way.shape[0] - base:
+            for r in ti.static(range(7)):
+                way[base + count, r] = q[r]
+            way[base + count, 7] = before
+            way[base + count, 8] = after
+            way[base + count, 9] = tick
+            low = ti.min(low, vec2(q[X], q[Y]))
+            high = ti.max(high, vec2(q[X], q[Y]))
+            count += 1
+        before = after
+        q = ahead
+        tick += taken * counts[4]
+        going = taken > 0
+    middle = 0.5 * (low + high)
+    radius = 0.5 * (high - low).norm() + numbers[18] + OUT
+    return count, middle, radius
+
+
+@ti.func
+def comes_near(
+    near: ti.template(), odds: ti.template(), tally: ti.template(), n, p, radius, tick, end
+):
+    """Whether object n can be near a disc about p at any time in [tick, end]."""
+    first = ti.cast(ti.max((tick - odds[0]) * odds[1], 0.0), ti.i32)
+    last = ti.min(ti.cast(ti.max((end - odds[0]) * odds[1], 0.0), ti.i32), tally[2] - 1)
+    found = False
+    k = ti.min(first, tally[2] - 1)
+    while k <= last and not found:
+        at = n * tally[2] + k
+        reach = near[at, 2] + radius
+        found = (vec2(near[at, 0], near[at, 1]) - p).norm_sqr() < reach * reach
+        k += 1
+    return found
+
+
+@ti.func
+def touch_on_way(
+    kind: ti.template(),
+    numbers: ti.template(),
+    counts: ti.template(),
+    robot,
+    windows: ti.template(),
+    places: ti.template(),
+    slots: ti.template(),
+    near: ti.template(),
+    pool: ti.template(),
+    odds: ti.template(),
+    tally: ti.template(),
+    way: ti.template(),
+    base,
+    count,
+    n,
+    most,
+):
+    """What object n adds to TOUCH on a way, until that is more than `most`; see kernels/risk.py.
+
+    Rests begin and end what is counted: there, half the chance to be touching is added.
+    """
+    total = 0.0
+    i = 0
+    while i < count and total <= most:
+        q = pose_in(way, base + i)
+        before = way[base + i, 7]
+        after = way[base + i, 8]
+        tick = way[base + i, 9]
+        if comes_near(
+            near, odds, tally, n, vec2(q[X], q[Y]), numbers[18] + OUT, tick - 500.0 * before,
+            tick + 500.0 * after,
+        ):
+            if at_rest(kind, q):
+                ends = ti.select(before > 0.0, 0.5, 0.0) + ti.select(after > 0.0, 0.5, 0.0)
+                total += ends * touched_now(
+                    numbers, counts, windows, places, slots, near, pool, odds, tally, n, n + 1, q,
+                    tick,
+                )  # fmt: skip
             total += flow_about(
                 kind, numbers, counts, robot, windows, places, slots, near, pool, odds, tally, n,
                 n + 1, q, tick, before, after,
             )  # fmt: skip
-        before = after
-        q = ahead
-        tick += taken * counts[4]
-        going = taken > 0 and total <= most
+        else:
+            total += counts[5] * odds[2] * (before + after)
+        i += 1
     return total
 
 
@@ -193,88 +238,105 @@ def weigh_children(
     first: ti.i32,  # nodes [first, last) are the parents
     last: ti.i32,
     steps: ti.i32,
+    workers: ti.i32,
     pose: Table,
     link: Links,
     risk: Table,  # [cap, 2] TOUCH and NEED of the parents' plans
     # in / out
     child: Table,  # [M, 12]
     child_proof: Counts,  # [M]
+    # scratch
+    way: Table,  # [workers x samples, 10], see `lay_way`
 ):
-    """Refuse children whose plans are too risky; `child_proof` then is the control that is allowed."""
+    """Refuse children whose plans are too risky; `child_proof` becomes the control that is allowed.
+
+    Each worker weighs every so many children, for itself.
+    """
     per_parent = counts[7]
     children = (last - first) * per_parent
-    for index in range(children * share):
-        m = index // share
-        if index % share == 0 and child_proof[m] > 0:
-            robot = robot_of(numbers)
-            parent = first + m // per_parent
-            q = pose_in(pose, parent)
-            tick = link[parent, TICK]
-            elapsed = (tick - link[0, TICK]) * numbers[1] / counts[4]
-            touch = risk[parent, 0]
-            need = risk[parent, 1]
-            proof = 0
-            b = -1
-            while b < counts[6]:
-                control = control_of(controls, m % per_parent)
-                direction = heading_for(kind, q)
-                count = steps
-                clear = True
-                # no robot gains more in the time that is left
-                gain = ti.max(ti.abs(control[1]), ti.abs(control[2]))
-                if ti.static(kind == CAR):
-                    gain = ti.abs(control[1])
-                if b >= 0:
-                    control = control_of(braking, b)
-                    direction = 0.0
-                    count = braking_steps(kind, q, control, numbers[1])
-                    gain = 0.0
-                    clear = brakes_clear(
-                        kind, arrival, spans, numbers, counts, robot, q, tick, control
-                    )
-                seconds = count * numbers[1]
-                fastest = ti.min(speed_of(kind, q) + gain * seconds, robot[0])
-                bound = allowed
-                if b >= 0:
-                    bound = ti.min(allowed, allowed_rate * (elapsed + seconds))
-                if clear:
-                    least = need_along(
-                        kind, hidden, hidden_spans, numbers, counts, robot, odds, q, tick, control,
-                        direction, count, fastest, need,
-                    )  # fmt: skip
-                    unhidden = 1.0 - hidden_chance(odds, tally, least)
-                    total = touch
-                    way = fastest * seconds + numbers[18] + OUT
-                    n = 0
-                    while n < tally[0] and 1.0 - (1.0 - total) * unhidden <= bound:
-                        if comes_near(
-                            near, odds, tally, n, q[X], q[Y], way, tick, tick + count * counts[4]
-                        ):
-                            total += touch_along(
-                                kind, numbers, counts, robot, windows, places, slots, near, pool,
-                                odds, tally, n, q, tick, control, direction, count, bound - total,
-                            )  # fmt: skip
-                        else:
-                            total += counts[5] * odds[2] * seconds
-                        n += 1
-                    chance = 1.0 - (1.0 - ti.min(total, 1.0)) * unhidden
-                    if b >= 0 and chance <= bound:
-                        proof = b + 1
-                        child[m, W_PS] = 1.0 / (1.0 - chance)
+    for index in range(workers * share):
+        worker = index // share
+        m = children
+        if index % share == 0:
+            m = worker
+        base = worker * (way.shape[0] // workers)
+        while m < children:
+            if child_proof[m] > 0:
+                robot = robot_of(numbers)
+                parent = first + m // per_parent
+                q = pose_in(pose, parent)
+                tick = link[parent, TICK]
+                elapsed = (tick - link[0, TICK]) * numbers[1] / counts[4]
+                touch = risk[parent, 0]
+                need = risk[parent, 1]
+                proof = 0
+                # the primitive first, then the braking controls in turn
+                b = -1
+                while b < counts[6]:
+                    control = control_of(controls, m % per_parent)
+                    direction = heading_for(kind, q)
+                    taken = steps
+                    clear = True
+                    # no robot gains more in the time that is left
+                    gain = ti.max(ti.abs(control[1]), ti.abs(control[2]))
+                    if ti.static(kind == CAR):
+                        gain = ti.abs(control[1])
+                    if b >= 0:
+                        control = control_of(braking, b)
+                        direction = 0.0
+                        taken = braking_steps(kind, q, control, numbers[1])
+                        gain = 0.0
+                        clear = brakes_clear(
+                            kind, arrival, spans, numbers, counts, robot, q, tick, control
+                        )
+                    seconds = taken * numbers[1]
+                    bound = allowed
+                    if b >= 0:
+                        bound = ti.min(allowed, allowed_rate * (elapsed + seconds))
+                    if clear:
+                        fastest = ti.min(speed_of(kind, q) + gain * seconds, robot[0])
+                        least = need_along(
+                            kind, hidden, hidden_spans, numbers, counts, robot, odds, q, tick,
+                            control, direction, taken, fastest, need,
+                        )  # fmt: skip
+                        unhidden = 1.0 - hidden_chance(odds, tally, least)
+                        count, middle, radius = lay_way(
+                            kind, numbers, counts, robot, tally, way, base, q, tick, control,
+                            direction, taken,
+                        )  # fmt: skip
+                        total = touch
+                        n = 0
+                        while n < tally[0] and 1.0 - (1.0 - total) * unhidden <= bound:
+                            if comes_near(
+                                near, odds, tally, n, middle, radius, tick, tick + taken * counts[4]
+                            ):
+                                total += touch_on_way(
+                                    kind, numbers, counts, robot, windows, places, slots, near,
+                                    pool, odds, tally, way, base, count, n, bound - total,
+                                )  # fmt: skip
+                            else:
+                                total += counts[5] * odds[2] * seconds
+                            n += 1
+                        chance = 1.0 - (1.0 - ti.min(total, 1.0)) * unhidden
+                        if b >= 0 and chance <= bound:
+                            proof = b + 1
+                            child[m, W_PS] = 1.0 / (1.0 - chance)
+                        elif b < 0 and chance <= bound:
+                            touch = total
+                            need = least
+                            child[m, TOUCH] = total
+                            child[m, NEED] = least
+                            for r in ti.static(range(7)):
+                                q[r] = child[m, r]
+                            tick += steps * counts[4]
+                            elapsed += seconds
+                        elif b < 0:
+                            b = counts[6]  # no braking mends it
+                    b += 1
+                    if proof > 0:
                         b = counts[6]
-                    elif b < 0 and chance <= bound:
-                        touch = total
-                        need = least
-                        child[m, TOUCH] = total
-                        child[m, NEED] = least
-                        for r in ti.static(range(7)):
-                            q[r] = child[m, r]
-                        tick += steps * counts[4]
-                        elapsed += seconds
-                    elif b < 0:
-                        b = counts[6]
-                b += 1
-            child_proof[m] = proof
+                child_proof[m] = proof
+            m += workers
 
 
 @kernel
