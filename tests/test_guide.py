@@ -1,8 +1,11 @@
 """The guide is the solution of the eikonal equation, whoever solves it."""
 
+import contextlib
+
 import numpy as np
 import pytest
 from oracle import exact
+from scipy.ndimage import distance_transform_edt
 
 from passpmp_ti import DifferentialDrive, FutureModel, Settings, device
 from passpmp_ti.kernels.eikonal import UNREACHED
@@ -122,6 +125,37 @@ def test_off_the_host_the_guide_costs_the_same(kind, speed):
     # the way ahead goes by which of two neighbours is the lesser, and they may be as good as equal
     close = np.isclose(here, there, rtol=2e-3, atol=1e-3)
     assert close.mean() > 0.97
+
+
+def cells_of(guide, model, mask):
+    """Cells of the guide's grid that hold the centres of a model's marked cells, as a mask."""
+    j, i = np.nonzero(mask)
+    low = np.array(guide.anchor) + guide._low
+    places = np.array(model.origin) + (np.stack([i, j], axis=1) + 0.5) * model.cell
+    cells = np.floor((places - low) / guide._cell).astype(int)
+    found = np.zeros(guide._shape, dtype=bool)
+    cells = cells[((cells >= 0) & (cells < found.shape[::-1])).all(axis=1)]
+    found[cells[:, 1], cells[:, 0]] = True
+    return found
+
+
+@pytest.mark.parametrize("movers", [False, True])
+@pytest.mark.parametrize("resident", [False, True])
+def test_what_a_model_shows_is_met_where_it_lies(movers, resident):
+    settings = SETTINGS.changed(guide_movers=movers)
+    world = exact.world_of([exact.box(1.5, 0.4, 0.4, 2.0)], [(-0.8, 1.1, 0.3)])
+    scan = exact.sweep(world, (0.3, 0, 0), 720, 2 * np.pi, 4.0, 0.0, labelled=True)
+    with device.forced() if resident else contextlib.nullcontext():
+        model = FutureModel.from_scan(scan, ROBOT, settings)
+        guide = guide_to((2.2, 0.5), model, settings)
+        corners = device.host(guide._meet(model)) == 0
+        walls, blocked = device.host(guide._walls) == 0, device.host(guide._blocked) == 1
+    for shown in (model.static, model.movable, model.standing_sources):
+        assert shown.any()
+    assert (walls == cells_of(guide, model, model.static)).all()
+    out_of = model.standing_sources | (model.movable if movers else False)
+    assert (corners == cells_of(guide, model, out_of)).all()
+    assert (blocked == (distance_transform_edt(~walls) < guide._kept)).all()
 
 
 def test_walls_met_on_the_way_are_kept_and_new_ones_count_at_once():

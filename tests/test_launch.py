@@ -7,6 +7,7 @@ import taichi as ti
 from passpmp_ti.kernels.launch import kernel
 
 Values = ti.types.ndarray(dtype=ti.f32, ndim=1)
+Pairs = ti.types.ndarray(dtype=ti.types.vector(2, ti.f32), ndim=1)
 
 
 @kernel
@@ -28,6 +29,15 @@ def counted(values: Values) -> ti.i32:
         if values[n] > 0:
             total += 1
     return total
+
+
+@kernel
+def summed(pairs: Pairs) -> ti.i32:
+    total = 0.0
+    ti.loop_config(serialize=True)
+    for n in range(pairs.shape[0]):
+        total += pairs[n][0] + pairs[n][1]
+    return ti.cast(total, ti.i32)
 
 
 def values(count=5):
@@ -62,6 +72,18 @@ def test_arrays_of_a_device_and_of_the_host_may_take_turns():
         scaled(1, given, 2.0, 0, 0, out)
         scaled(1, there, 2.0, 0, 0, back)
         assert (back.to_numpy() == out).all()
+
+
+def test_arrays_of_vectors_are_handed_over_too():
+    given = np.arange(12, dtype=np.float32).reshape(6, 2)
+    there = ti.ndarray(Pairs.dtype, 6)
+    there.from_numpy(given)
+    summed(given)
+    for pairs in (given, there):
+        assert summed(pairs) == given.sum()
+    for wrong in (given[:, :1].copy(), given.reshape(3, 4), given[0], given.reshape(2, 3, 2)):
+        with pytest.raises(Exception):  # noqa: B017, PT011 - whatever Taichi raises
+            summed(wrong)
 
 
 def test_what_a_kernel_returns_comes_back():

@@ -283,10 +283,10 @@ def arrival_times(
                     square = vec(0)
                     if kind != UNSEEN or verdict < 0:
                         square = nearest(squares, least, kind, j, b, border, most)
+                    elif verdict > 0:
+                        square = most
                     if kind == UNSEEN:
                         free = square > unseen_square
-                        if verdict > 0:
-                            free = vec(1)
                         most = ti.select(free, FAR * FAR, 0)
                         ticks = ti.select(free, NEVER, 0)
                     else:

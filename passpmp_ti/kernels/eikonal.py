@@ -10,6 +10,8 @@ Not part of the guarantee: a wrong guide costs time, never safety.
 import taichi as ti
 
 from passpmp_ti.kernels.launch import kernel
+from passpmp_ti.kernels.stretch import STRETCH, bare
+from passpmp_ti.kernels.visibility import MOVABLE_CELLS, STANDING_SOURCES, STATIC_CELLS
 
 UNREACHED = 1e9
 SETTLED = 5e-4  # share of its slowness by which a cell's time must fall to count as changed
@@ -19,6 +21,7 @@ RUN = 16  # cells in a row that one thread lays out
 Field = ti.types.ndarray(dtype=ti.f32, ndim=2)  # [J, I]
 Whole = ti.types.ndarray(dtype=ti.i32, ndim=2)
 Mask = ti.types.ndarray(dtype=ti.u8, ndim=2)
+Line = ti.types.ndarray(dtype=ti.i32, ndim=1)
 
 
 @ti.func
@@ -39,6 +42,18 @@ def fallen(old, a, b, slowness):
     return result
 
 
+@ti.func
+def block_about(blocked: ti.template(), row, column, reach):
+    """Mark the cells in which the robot cannot be for a wall at [row, column]."""
+    span = ti.cast(reach, ti.i32) + 1
+    for dj, di in ti.ndrange((-span, span + 1), (-span, span + 1)):
+        j = row + dj
+        i = column + di
+        if j >= 0 and i >= 0 and j < blocked.shape[0] and i < blocked.shape[1]:
+            if ti.sqrt(ti.cast(dj * dj + di * di, ti.f32)) < reach:
+                blocked[j, i] = ti.u8(1)  # whoever else writes here writes the same
+
+
 @kernel
 def block(
     # in
@@ -47,15 +62,42 @@ def block(
     # in / out
     blocked: Mask,  # [J, I] 1: near a wall
 ):
-    span = ti.cast(reach, ti.i32) + 1
-    ti.loop_config(parallelize=1)  # those that are new in a cycle are few
     for n in range(cells.shape[0]):
-        for dj, di in ti.ndrange((-span, span + 1), (-span, span + 1)):
-            j = cells[n, 0] + dj
-            i = cells[n, 1] + di
-            if j >= 0 and i >= 0 and j < blocked.shape[0] and i < blocked.shape[1]:
-                if ti.sqrt(ti.cast(dj * dj + di * di, ti.f32)) < reach:
-                    blocked[j, i] = ti.u8(1)  # whoever else writes here writes the same
+        block_about(blocked, cells[n, 0], cells[n, 1], reach)
+
+
+@kernel
+def meet(
+    # in
+    marks: ti.types.ndarray(dtype=ti.u8, ndim=3),  # [5, K, N] 0 marks, of a model
+    rows: Line,  # [K] row of this grid that a row of the model lies in; < 0: none
+    columns: Line,  # [N] the same of columns
+    movers: ti.i32,  # 1: something may step out from surfaces that may move, too
+    reach: ti.f32,  # cells from a wall in which the robot cannot be
+    # in / out
+    walls: Mask,  # [J, I] 0: a wall was met there
+    blocked: Mask,  # [J, I] 1: near a wall
+    corners: Mask,  # [J, I] of 1; 0 where something may step out
+):
+    """What a model shows, on the guide's grid. All that write to a cell write the same there."""
+    for k in range(marks.shape[1]):
+        for stretch in range((marks.shape[2] + STRETCH - 1) // STRETCH):
+            begin = stretch * STRETCH
+            passed = bare(marks, STATIC_CELLS, STANDING_SOURCES, k, begin)
+            if movers == 1 and passed:
+                passed = bare(marks, MOVABLE_CELLS, MOVABLE_CELLS, k, begin)
+            if rows[k] >= 0 and not passed:
+                for n in range(begin, ti.min(begin + STRETCH, marks.shape[2])):
+                    j = rows[k]
+                    i = columns[n]
+                    if i >= 0:
+                        if marks[STATIC_CELLS, k, n] == 0 and walls[j, i] != 0:
+                            walls[j, i] = ti.u8(0)
+                            block_about(blocked, j, i, reach)
+                        if marks[STANDING_SOURCES, k, n] == 0:
+                            corners[j, i] = ti.u8(0)
+                        if movers == 1 and marks[MOVABLE_CELLS, k, n] == 0:
+                            corners[j, i] = ti.u8(0)
 
 
 @kernel

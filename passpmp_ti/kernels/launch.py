@@ -80,11 +80,20 @@ def _parameters(primal):
             setters.append((place, slot, _put_uint, None))
         elif id(wanted) == id(ti.f32):
             setters.append((place, slot, _put_float, None))
-        elif id(getattr(wanted, "dtype", None)) in ARRAYS:
-            setters.append((place, slot, _put_array, (ARRAYS[id(wanted.dtype)], wanted.ndim)))
+        elif (kind := _elements(getattr(wanted, "dtype", None))) is not None:
+            setters.append((place, slot, _put_array, (*kind, wanted.ndim)))
         else:
             return templates, None
     return templates, setters
+
+
+def _elements(dtype):
+    """(NumPy's type, shape of one element) of an array's elements; None: Taichi's way."""
+    if id(dtype) in ARRAYS:
+        return ARRAYS[id(dtype)], ()
+    if isinstance(dtype, type(ti.types.vector(2, ti.f32))) and id(dtype.dtype) in ARRAYS:
+        return ARRAYS[id(dtype.dtype)], tuple(dtype.get_shape())
+    return None
 
 
 def _compiled(primal, args):
@@ -122,20 +131,25 @@ def _put_float(context, slot, value, _):
 
 
 def _put_array(context, slot, value, wanted):
+    dtype, element, dimensions = wanted
     if type(value) is np.ndarray:
-        dtype, dimensions = wanted
-        fits = value.dtype == dtype and value.ndim == dimensions and value.size <= MOST
-        if not (fits and value.flags.c_contiguous):
+        shape = value.shape
+        fits = value.dtype == dtype and len(shape) == dimensions + len(element)
+        if not (fits and value.size <= MOST and value.flags.c_contiguous):
             return False
-        context.set_arg_external_array_with_shape(
-            slot, value.ctypes.data, value.nbytes, value.shape, 0
-        )
+        if element:
+            if shape[dimensions:] != element:
+                return False
+            shape = shape[:dimensions]
+        context.set_arg_external_array_with_shape(slot, value.ctypes.data, value.nbytes, shape, 0)
         return True
     if isinstance(value, ti.Ndarray):
         # its type and dimensions were compiled for, or are told apart by Taichi
-        if value.grad is not None or len(value.shape) != wanted[1]:
+        if value.grad is not None or len(value.shape) != dimensions:
             return False
-        if value.dtype is None or ARRAYS.get(id(value.dtype)) != wanted[0]:
+        if value.dtype is None or ARRAYS.get(id(value.dtype)) != dtype:
+            return False
+        if tuple(value.element_shape) != element:
             return False
         context.set_arg_ndarray(slot, value.arr)
         return True

@@ -3,22 +3,11 @@
 import taichi as ti
 
 from passpmp_ti.kernels.launch import kernel
+from passpmp_ti.kernels.stretch import STRETCH, bare
 from passpmp_ti.kernels.visibility import MOVABLE_CELLS, STATIC_CELLS
-
-STRETCH = 64
-"""Cells of a row that are passed over together where they hold no surface."""
 
 Cells = ti.types.ndarray(dtype=ti.u8, ndim=2)  # [J, I] 1: proven empty
 Marks = ti.types.ndarray(dtype=ti.u8, ndim=3)  # [5, J, I] 0 marks
-
-
-@ti.func
-def bare(marks: ti.template(), j, begin, end):
-    """Whether a stretch of a row holds no surface: most hold none, and this is quickly told."""
-    unmarked = ti.u8(1)
-    for i in range(begin, end):
-        unmarked &= marks[STATIC_CELLS, j, i] & marks[MOVABLE_CELLS, j, i]
-    return unmarked != 0
 
 
 @ti.func
@@ -66,16 +55,14 @@ def surfaces_gone(
     for j in range(marks.shape[1]):
         here = ti.math.ivec2(0, 0)
         row = j + shift_j
-        begin = 0
-        while begin < marks.shape[2]:
-            end = ti.min(begin + STRETCH, marks.shape[2])
-            if not bare(marks, j, begin, end):
-                for i in range(begin, end):
+        for stretch in range((marks.shape[2] + STRETCH - 1) // STRETCH):
+            begin = stretch * STRETCH
+            if not bare(marks, STATIC_CELLS, MOVABLE_CELLS, j, begin):
+                for i in range(begin, ti.min(begin + STRETCH, marks.shape[2])):
                     at = i + shift_i
                     here += asked_and_gone(
                         marks, seen, STATIC_CELLS, j, i, row, at, static_reach
                     ) + asked_and_gone(marks, seen, MOVABLE_CELLS, j, i, row, at, movable_reach)
-            begin = end
         # whole numbers: the order in which rows are added does not matter
         if here[0] > 0:
             found[0] += here[0]

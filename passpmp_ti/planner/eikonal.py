@@ -34,12 +34,12 @@ def solve(slowness: device.Array, goal: tuple[int, int], time: device.Array) -> 
             return
 
 
-def distances_to_zeros(mask: np.ndarray) -> device.Array:
-    """[J, I] float32 [cells] to the nearest cell that is 0, where the kernels read it."""
+def distances_to_zeros(mask: device.Array) -> device.Array:
+    """[J, I] float32 [cells] to the nearest cell that is 0 of a uint8 mask."""
     if not device.resident():
         return distance_to_zeros(mask)
     column = device.empty(mask.shape, np.int32)
     distance = device.empty(mask.shape, np.float32)
-    column_distance(device.put(mask), column)
+    column_distance(mask, column)
     row_distance(column, distance)
     return distance

@@ -11,7 +11,7 @@ from passpmp_ti import device
 from passpmp_ti.grid.model import FutureModel
 from passpmp_ti.grid.static_map import StaticMap
 from passpmp_ti.grid.tubes import asked_speed
-from passpmp_ti.kernels.eikonal import block, lay_out, point_ahead
+from passpmp_ti.kernels.eikonal import block, lay_out, meet, point_ahead
 from passpmp_ti.kernels.guide import guide_costs
 from passpmp_ti.planner.eikonal import distances_to_zeros, solve
 from passpmp_ti.robots import Robot
@@ -84,13 +84,21 @@ class Guide:
             math.sqrt(float(extent.prod()) / MOST_CELLS),
         )
         columns, rows = (int(n) for n in np.ceil(extent / self._cell) + 1)
-        self._walls = np.ones((rows, columns), dtype=np.uint8)
-        self._blocked = device.put(np.zeros((rows, columns), dtype=np.uint8))
+        self._shape = (rows, columns)
+        self._walls = device.full(self._shape, 1, np.uint8)
+        self._blocked = device.full(self._shape, 0, np.uint8)
+        # the model keeps up to a cell more from a wall than the clearance
+        self._kept = (settings.clearance(robot) + settings.cell) / self._cell + 0.5
         self._slowness = device.empty((rows, columns), np.float32)
         self._down = device.empty((rows, columns), np.int32)
         self._numbers = device.put(self._lay_out_numbers())
         if static_map is not None:
-            self._meet(_map_points(static_map))
+            cells = np.stack(self._cells(_map_points(static_map)), axis=1)
+            walls = np.ones(self._shape, dtype=np.uint8)
+            walls[cells[:, 0], cells[:, 1]] = 0
+            self._walls = device.put(walls)
+            met = np.argwhere(walls == 0).astype(np.int32)
+            block(device.put(met), self._kept, self._blocked)
 
     def field(
         self, model: FutureModel, goal: tuple[float, float], position: np.ndarray
@@ -111,12 +119,14 @@ class Guide:
             return GuideField(
                 device.put(nothing[0]), device.put(nothing), device.put(frame), self.anchor
             )
-        rows, columns = self._walls.shape
+        rows, columns = self._shape
         j = int(np.clip((local_goal[1] - self._low[1]) / self._cell, 0, rows - 1))
         i = int(np.clip((local_goal[0] - self._low[0]) / self._cell, 0, columns - 1))
-        self._meet(_centres(model, model.static))
-        time = device.empty((rows, columns), np.float32)
-        lay_out(self._numbers, self._blocked, self._to_corner(model), j, i, self._slowness, time)
+        time = device.empty(self._shape, np.float32)
+        corners = self._meet(model)
+        lay_out(
+            self._numbers, self._blocked, distances_to_zeros(corners), j, i, self._slowness, time
+        )
         solve(self._slowness, (j, i), time)
         here = (np.asarray(position) - np.array(self.anchor) - self._low) / self._cell
         low = np.clip(np.floor(here - AROUND), 0, None).astype(int)
@@ -129,27 +139,26 @@ class Guide:
             ahead = device.put(np.zeros((1, 1, 2), dtype=np.float32))
         return GuideField(time, ahead, device.put(frame), self.anchor)
 
-    def _meet(self, walls: np.ndarray) -> None:
-        """Remember walls at world points [n, 2]."""
-        j, i = self._cells(walls)
-        new = np.flatnonzero(self._walls[j, i])
-        if not len(new):
-            return
-        cells = np.stack([j[new], i[new]], axis=1).astype(np.int32)
-        self._walls[cells[:, 0], cells[:, 1]] = 0
-        settings = self._settings
-        # the model keeps up to a cell more from a wall than the clearance
-        kept = (settings.clearance(self._robot) + settings.cell) / self._cell + 0.5
-        block(device.put(cells), kept, self._blocked)
+    def _meet(self, model: FutureModel) -> device.Array:
+        """Remember the walls that a model shows; [J, I] uint8, 0 where something may step out."""
+        corners = device.full(self._shape, 1, np.uint8)
+        # where movers are now: nose to somebody who stands, a robot cannot even turn
+        meet(
+            model.marks, *self._lines(model), int(self._settings.guide_movers), self._kept,
+            self._walls, self._blocked, corners,
+        )  # fmt: skip
+        return corners
 
-    def _to_corner(self, model: FutureModel) -> device.Array:
-        """[J, I] float32 [cells] to the nearest place that something may step out from."""
-        corners = np.ones(self._walls.shape, dtype=np.uint8)
-        corners[self._cells(_centres(model, model.standing_sources))] = 0
-        if self._settings.guide_movers:
-            # where they are now: nose to somebody who stands, a robot cannot even turn
-            corners[self._cells(_centres(model, model.movable))] = 0
-        return distances_to_zeros(corners)
+    def _lines(self, model: FutureModel) -> tuple[device.Array, device.Array]:
+        """([J] rows, [I] columns) int32 of this grid that the centres of a model's rows and columns
+        lie in; -1: in none."""
+        lines = []
+        for axis in (1, 0):
+            centres = model.origin[axis] + (np.arange(model.window.size) + 0.5) * model.cell
+            line = np.floor((centres - (self.anchor[axis] + self._low[axis])) / self._cell)
+            inside = (line >= 0) & (line < self._shape[1 - axis])
+            lines.append(device.put(np.where(inside, line, -1).astype(np.int32)))
+        return lines[0], lines[1]
 
     def _lay_out_numbers(self) -> np.ndarray:
         """[5] float32 that `lay_out` reads.
@@ -174,18 +183,10 @@ class Guide:
         """(rows, columns) of the cells that hold world points [n, 2]; without those outside."""
         offset = np.array(self.anchor) + self._low
         cells = np.floor((points - offset) / self._cell).astype(int)
-        rows, columns = self._walls.shape
+        rows, columns = self._shape
         inside = (cells >= 0).all(axis=1) & (cells[:, 0] < columns) & (cells[:, 1] < rows)
         i, j = cells[inside].T
         return j, i
-
-
-def _centres(model: FutureModel, marked: np.ndarray) -> np.ndarray:
-    """[n, 2] world centres of marked cells [m]."""
-    # far quicker than a two-dimensional nonzero, and these masks are large and almost empty
-    j, i = np.divmod(np.flatnonzero(marked), marked.shape[1])
-    x, y = model.origin
-    return np.stack([x + (i + 0.5) * model.cell, y + (j + 0.5) * model.cell], axis=1)
 
 
 def mean_cost(times: np.ndarray, costs: np.ndarray, horizon: float) -> float:
