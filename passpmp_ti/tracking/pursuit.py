@@ -10,7 +10,7 @@ import numpy as np
 from passpmp_ti import door
 from passpmp_ti.settings import Settings
 from passpmp_ti.tracking import imm
-from passpmp_ti.tracking.assignment import assign
+from passpmp_ti.tracking.assignment import GATE, assign
 from passpmp_ti.tracking.detections import Detections, detect
 from passpmp_ti.tracking.segments import longest
 from passpmp_ti.tracking.sighting import Sighting
@@ -25,6 +25,10 @@ DETECTS = 0.9
 """Chance that an object in plain view is met."""
 ROUND_UP = 1.0 + 1e-9
 """Discs are said to be this much larger, so that no rounding leaves a return outside."""
+MOMENT = 0.3
+"""Who was met no longer ago than this is looked for as far as he can have gone [s]."""
+SLACK = 0.1
+"""Pieces of a body may stick out of the disc where it is expected by this much [object widths]."""
 SHRINK = 2.0
 """Time constant in which a radius that was once seen is forgotten [s]."""
 
@@ -59,19 +63,21 @@ def follow(
         bank = imm.predicted(old.bank, round(stamp - old.stamp, 6), speed)
         kept = _Kept.of(old)
 
-    centre, deviation, body = found.placed()
-    mean, covariance = bank.combined()
-    farthest = kept.radius + longest(settings) + speed * (stamp - kept.last_seen)
-    track = assign(mean[:, :2], covariance[:, :2, :2], centre, deviation, farthest)
-    met = np.flatnonzero(track >= 0)
-    if len(met):
-        told = np.full(found.count, np.nan)
-        told[met] = kept.body[track[met]]
-        centre, deviation, body = found.placed(told)
-        bank = _with(bank, track[met], imm.updated(
-            bank.taken(track[met]), centre[met], deviation[met], speed
-        ))  # fmt: skip
-    track = _absorbed(track, found, bank.combined()[0][:, :2], kept.radius)
+    place = bank.combined()[0][:, :2]
+    found = found.united(_pieces(found, place, kept.radius, settings))
+    track, anew = _assigned(found, bank, kept, stamp, settings)
+    told = np.full(found.count, np.nan)
+    told[track >= 0] = kept.body[track[track >= 0]]
+    centre, deviation, body = found.placed(told)
+    for which, filtered in ((~anew, True), (anew, False)):
+        d = np.flatnonzero((track >= 0) & which)
+        if len(d) and filtered:
+            old_bank = bank.taken(track[d])
+            bank = bank.replaced(
+                track[d], imm.updated(old_bank, centre[d], deviation[d], speed)
+            )
+        elif len(d):
+            bank = bank.replaced(track[d], imm.born(centre[d], deviation[d], speed))
     fresh = np.flatnonzero(track < 0)
     track[fresh] = len(bank) + np.arange(len(fresh))
     bank = bank.joined(imm.born(centre[fresh], deviation[fresh], speed))
@@ -162,32 +168,61 @@ class _Kept:
         )
 
 
-def _with(bank: imm.Bank, index: np.ndarray, new: imm.Bank) -> imm.Bank:
-    """The bank with the tracks of an index replaced."""
-    mean, covariance, weight = bank.mean.copy(), bank.covariance.copy(), bank.weight.copy()
-    mean[index], covariance[index], weight[index] = new.mean, new.covariance, new.weight
-    return imm.Bank(mean, covariance, weight)
-
-
-def _absorbed(
-    track: np.ndarray, found: Detections, place: np.ndarray, radius: np.ndarray
+def _pieces(
+    found: Detections, place: np.ndarray, radius: np.ndarray, settings: Settings
 ) -> np.ndarray:
-    """[M] tracks of the detections; pieces of an object that was met belong to it.
+    """[d] labels, equal for the pieces of one body.
 
-    A post in front of somebody parts him in two. The piece that was assigned tells where he is;
-    another piece of which every return lies in his disc is his, too.
+    A post in front of somebody parts him in two. What lies altogether in the disc where a track is
+    expected is a piece of it; where several tracks claim it, the oldest has it.
     """
-    track = track.copy()
-    loose, held = np.flatnonzero(track < 0), np.unique(track[track >= 0])
-    if not len(loose) or not len(held):
-        return track
-    for d in loose:
-        points = found.points[found.owner == d]
-        reach = np.hypot(*(points[None] - place[held][:, None]).T).T.max(axis=1)
-        inside = reach <= radius[held]
-        if inside.any():
-            track[d] = held[int(np.argmin(np.where(inside, reach, np.inf)))]
-    return track
+    label = np.arange(found.count)
+    if not found.count or not len(place):
+        return label
+    slack = SLACK * settings.object_width
+    inside = found.reach(place) <= radius + slack
+    return np.where(inside.any(axis=1), -1 - np.argmax(inside, axis=1), label)
+
+
+def _assigned(
+    found: Detections, bank: imm.Bank, kept: _Kept, stamp: float, settings: Settings
+) -> tuple[np.ndarray, np.ndarray]:
+    """[d] the track of each detection, -1: none; and whether its filters have to begin anew.
+
+    First by what the filters expect. Then a track that was met a moment ago may have what nobody
+    else has and it can have reached, at the bound on speeds: somebody who turned on the spot, or who
+    is half hidden and was taken for thinner than he is.
+    """
+    speed = settings.object_speed
+    centre, deviation, _ = found.placed()
+    mean, covariance = bank.combined()
+    since = stamp - kept.last_seen
+    farthest = kept.radius + longest(settings) + speed * since
+    track = assign(mean[:, :2], covariance[:, :2, :2], centre, deviation, farthest)
+    anew = np.zeros(found.count, dtype=bool)
+    free = np.setdiff1d(np.flatnonzero(since <= MOMENT), track)
+    loose = np.flatnonzero(track < 0)
+    if not len(free) or not len(loose):
+        return track, anew
+    thinner = np.fmax(kept.body[free] - 0.5 * settings.object_width, 0.0)
+    reach = speed * since[free] + thinner
+    near = np.zeros((len(free), 2, 2))
+    near[:, [0, 1], [0, 1]] = (reach**2 / GATE)[:, None]
+    second = assign(
+        kept.last_centre[free], near, centre[loose], deviation[loose], reach + 3 * settings.cell
+    )
+    hit = second >= 0
+    track[loose[hit]] = free[second[hit]]
+    told = np.full(found.count, np.nan)
+    told[loose[hit]] = kept.body[free[second[hit]]]
+    centre, deviation, _ = found.placed(told)
+    for d in loose[hit]:
+        n = [track[d]]
+        expected = assign(
+            mean[n, :2], covariance[n, :2, :2], centre[[d]], deviation[[d]], farthest[n]
+        )
+        anew[d] = expected[0] < 0
+    return track, anew
 
 
 def _met(
