@@ -122,7 +122,7 @@ def row(name: str, tally: Tally) -> str:
 def accuracy(options: argparse.Namespace) -> None:
     """Print the table of accuracy."""
     print(
-        "| seen | cycles | tracks, mean / most | returns explained [%] | movers in view followed [%]"
+        "| seen | cycles | tracks, mean / most | returns explained [%] | movers followed [%]"
         " | position error, median / 95 % [m] | velocity error, median / 95 % [m/s] | id switches"
         " per 1,000 | cycle, median / 99 % [ms] |"
     )

@@ -167,7 +167,7 @@ def promises(
         places: discs a track and time.
         generator: draws them.
     """
-    count, kinds = forecast.weight.shape
+    kinds = forecast.weight.shape[1]
     for step, time in enumerate(forecast.times):
         n = np.repeat(np.flatnonzero(known[step]), places)
         chosen = generator.uniform(size=len(n))[:, None] > np.cumsum(forecast.weight[n], axis=1)

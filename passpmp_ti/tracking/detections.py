@@ -111,7 +111,7 @@ class Detections:
 def detect(sightings: Sequence[Sighting], settings: Settings) -> Detections:
     """Objects in the sightings of one instant.
 
-    What two sensors see is one object if the centre of one sensor's lies in the disc of the other's.
+    What two sensors see is one object if the one's centre lies in the other's disc.
     """
     parts = [segments_of(s, settings) for s in sightings]
     sides = Sides.of(parts, sightings)
