@@ -39,6 +39,7 @@ LAYERS = 0.1 * np.arange(1, 31)
 """Times of the forecast that is timed [s]."""
 BEAMS, RANGE = 1081, 10.0
 """Of the range finders that other recordings are seen with, as in the scenario eth."""
+LOGS = "${PASSPMP_DATA}/lidar_carmen/README.md"
 BEYOND = 10.5
 """People come from and leave to this far outside of where they were recorded [m]."""
 
@@ -121,7 +122,7 @@ def row(name: str, tally: Tally) -> str:
 def accuracy(options: argparse.Namespace) -> None:
     """Print the table of accuracy."""
     print(
-        "| seen | cycles | tracks, mean / most | returns explained [%] | movers in view followed [%]"
+        "| seen | cycles | tracks, mean / most | returns explained [%] | movers followed [%]"
         " | position error, median / 95 % [m] | velocity error, median / 95 % [m/s] | id switches"
         " per 1,000 | cycle, median / 99 % [ms] |"
     )
@@ -137,7 +138,7 @@ def accuracy(options: argparse.Namespace) -> None:
         for seed in seeds:
             total.add(watch(*standing(scenario, seed), seconds, seed))
         print(row(f"`{name}`", total), flush=True)
-    logs = options.log or sorted(find_data("${PASSPMP_DATA}/lidar_carmen", None).glob("*.log.gz"))
+    logs = options.log or sorted(find_data(LOGS, Path()).parent.glob("*.log.gz"))
     for path in logs:
         print(row(f"log {path.name.split('.')[0]}", watch_log(path)), flush=True)
 

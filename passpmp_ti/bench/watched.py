@@ -18,6 +18,8 @@ from passpmp_ti.sim.lidar import Lidar
 from passpmp_ti.sim.world import World
 from passpmp_ti.tracking import Forecast, Sighting, Tracks
 
+GROWN_UP = 1.0
+"""Velocities of younger tracks are not judged [s]."""
 CLOSE = 3.0
 """A track farther than this from a mover's centre is not taken for it [object widths]."""
 
@@ -82,9 +84,6 @@ class Tally:
     tracks: list[int] = field(default_factory=list)
     _known: dict[int, int] = field(default_factory=dict)
 
-    GROWN_UP = 1.0
-    """Velocities of younger tracks are not judged [s]."""
-
     def count(self, tracks: Tracks, sightings: list[Sighting], seconds: float) -> None:
         """Take a cycle down; no truth is needed."""
         self.seconds.append(seconds)
@@ -92,6 +91,13 @@ class Tally:
         for sighting, owner in zip(sightings, tracks.owner, strict=True):
             self.returns += int(sighting.movable.sum())
             self.explained += int((owner[sighting.movable] >= 0).sum())
+
+    def add(self, other: Tally) -> None:
+        """Take over what another tally counted."""
+        for name in ("position", "speed", "seconds", "tracks"):
+            getattr(self, name).extend(getattr(other, name))
+        for name in ("movers_seen", "movers_followed", "switches", "returns", "explained"):
+            setattr(self, name, getattr(self, name) + getattr(other, name))
 
     def judge(self, tracks: Tracks, sightings: list[Sighting], scene: Scene) -> None:
         """Compare a cycle with the truth."""
@@ -101,7 +107,7 @@ class Tally:
         truth = movers.positions(np.array([stamp - 0.05, stamp]))
         velocity = (truth[1] - truth[0]) / 0.05
         self.position.append(np.hypot(*(tracks.positions[own] - truth[1, mine[own]]).T))
-        old = own[tracks.age[own] >= self.GROWN_UP]
+        old = own[tracks.age[own] >= GROWN_UP]
         self.speed.append(np.hypot(*(tracks.velocities[old] - velocity[mine[old]]).T))
         for n in own:
             known = self._known.get(int(mine[n]))
@@ -161,7 +167,7 @@ def promises(
         places: discs a track and time.
         generator: draws them.
     """
-    count, kinds = forecast.weight.shape
+    kinds = forecast.weight.shape[1]
     for step, time in enumerate(forecast.times):
         n = np.repeat(np.flatnonzero(known[step]), places)
         chosen = generator.uniform(size=len(n))[:, None] > np.cumsum(forecast.weight[n], axis=1)

@@ -1,17 +1,18 @@
-"""Segments as objects with a centre: the returns are the near side of a body."""
+"""Objects of one cycle, each with a centre: the returns are the near side of a body."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from passpmp_ti.settings import Settings
 from passpmp_ti.tracking.segments import longest, segments_of
+from passpmp_ti.tracking.sides import Sides
 from passpmp_ti.tracking.sighting import Sighting
 
-SHAPE_ERROR = 0.07
+SHAPE_ERROR = 0.06
 """Standard deviation of a centre, since bodies are no discs [object widths]."""
 HIDDEN_ERROR = 0.5
 """Likewise where an end of the body is hidden [radii]."""
@@ -19,22 +20,11 @@ HIDDEN_ERROR = 0.5
 
 @dataclass(frozen=True, slots=True)
 class Detections:
-    """Objects of one cycle; d counts objects, m their sides as seen by one sensor each."""
+    """Objects of one cycle; d counts objects, m their sides, p returns."""
 
+    sides: Sides
     group: np.ndarray
     """[m] object that each side belongs to."""
-    origin: np.ndarray
-    """[m, 2] the sensor that saw the side [m]."""
-    first: np.ndarray
-    """[m] bearing of the side's clockwise end, half a beam beyond its first return [rad]."""
-    half: np.ndarray
-    """[m] half of the bearing to its other end [rad]."""
-    nearest: np.ndarray
-    """[m] least range [m]."""
-    spacing: np.ndarray
-    """[m] between neighbouring returns, across the beams [m]."""
-    whole: np.ndarray
-    """[m, 2] bool: the first, the last end is the body's own, not an occluder's."""
     points: np.ndarray
     """[p, 2] all returns [m]."""
     owner: np.ndarray
@@ -48,7 +38,7 @@ class Detections:
     noise: float
     """Standard deviation of a centre that is well seen [m]."""
 
-    def placed(self, radius: np.ndarray | None = None) -> tuple[np.ndarray, ...]:
+    def placed(self, radius: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Centre [d, 2] [m], its standard deviation [d] [m] and the body's radius [d] [m].
 
         The body is taken for a disc. Where both its ends are seen, at bearings 2 a apart, and its
@@ -61,104 +51,94 @@ class Detections:
         Args:
             radius: [d] what is known of the radius, NaN where nothing is [m].
         """
-        least, greatest = self.limits
-        sine = np.sin(np.minimum(self.half, 1.0))
-        visible = np.clip(self.nearest * sine / (1.0 - sine), least, greatest)
-        hidden = ~self.whole.all(axis=1)
+        sides, (least, greatest) = self.sides, self.limits
+        sine = np.sin(np.minimum(sides.half, 1.0))
+        visible = np.clip(sides.nearest * sine / (1.0 - sine), least, greatest)
+        hidden = ~sides.whole.all(axis=1)
         if radius is not None:
-            told = np.fmax(radius[self.group], least)
-            visible = np.where(hidden, np.fmax(visible, told), visible)
-        distance = self.nearest + visible
+            visible = np.where(hidden, np.fmax(visible, radius[self.group]), visible)
+        distance = sides.nearest + visible
         off = np.arcsin(visible / distance)
-        middle = self.first + self.half
-        bearing = np.where(
-            self.whole[:, 0] & hidden,
-            self.first + off,
-            np.where(self.whole[:, 1] & hidden, self.first + 2 * self.half - off, middle),
+        bearing = sides.first + np.where(
+            sides.whole[:, 0] & hidden,
+            off,
+            np.where(sides.whole[:, 1] & hidden, 2 * sides.half - off, sides.half),
         )
-        centre = self.origin + distance[:, None] * np.stack(
-            [np.cos(bearing), np.sin(bearing)], axis=1
-        )
-        variance = self.noise**2 + (0.5 * self.spacing) ** 2
+        way = np.stack([np.cos(bearing), np.sin(bearing)], axis=1)
+        centre = sides.origin + distance[:, None] * way
+        variance = self.noise**2 + (0.5 * sides.spacing) ** 2
         variance += np.where(hidden, (HIDDEN_ERROR * visible) ** 2, 0.0)
         weight = 1.0 / variance
         total = np.bincount(self.group, weight, self.count)
-        mean, body = (
-            np.stack(
-                [np.bincount(self.group, weight * c, self.count) / total for c in columns], axis=1
-            )
-            for columns in (centre.T, visible[None])
+        x, y, body = (
+            np.bincount(self.group, weight * value, self.count) / total
+            for value in (centre[:, 0], centre[:, 1], visible)
         )
         best = np.full(self.count, np.inf)
         np.minimum.at(best, self.group, variance)
-        return mean, np.sqrt(best), body[:, 0]
+        return np.stack([x, y], axis=1), np.sqrt(best), body
 
     def clear(self) -> np.ndarray:
         """[d] bool: some sensor sees both ends of the object."""
         found = np.zeros(self.count, dtype=bool)
-        np.logical_or.at(found, self.group, self.whole.all(axis=1))
+        np.logical_or.at(found, self.group, self.sides.whole.all(axis=1))
         return found
+
+    def reach(self, places: np.ndarray) -> np.ndarray:
+        """[d, n] distance of each object's farthest return from places [n, 2] [m]."""
+        found = np.zeros((self.count, len(places)))
+        apart = np.hypot(*np.moveaxis(self.points[:, None] - places[None], -1, 0))
+        np.maximum.at(found, self.owner, apart)
+        return found
+
+    def united(self, label: np.ndarray) -> Detections:
+        """Objects [d] with equal labels as one, numbered by their labels' order."""
+        _, label = np.unique(label, return_inverse=True)
+        count = int(label.max(initial=-1)) + 1
+        if count == self.count:
+            return self
+        sides, group = self.sides.merged(label[self.group])
+        return replace(
+            self,
+            sides=sides,
+            group=group,
+            owner=label[self.owner],
+            beams=tuple((beams, label[own]) for beams, own in self.beams),
+            count=count,
+        )
 
 
 def detect(sightings: Sequence[Sighting], settings: Settings) -> Detections:
     """Objects in the sightings of one instant.
 
-    Sides that two sensors see are one object's if the centre of one lies in the other's disc.
+    What two sensors see is one object if the one's centre lies in the other's disc.
     """
     parts = [segments_of(s, settings) for s in sightings]
-    sides = [len(p.first) for p in parts]
-    base = np.concatenate([[0], np.cumsum(sides)]).astype(int)
-    halves = [0.5 * (p.span + s.increment) for p, s in zip(parts, sightings, strict=True)]
+    sides = Sides.of(parts, sightings)
+    base = np.searchsorted(sides.sensor, np.arange(len(parts)))
+    beams = tuple((p.beams, p.label + b) for p, b in zip(parts, base, strict=True))
     found = Detections(
-        group=np.arange(base[-1]),
-        origin=_joined(
-            [np.tile(s.origin, (m, 1)) for s, m in zip(sightings, sides, strict=True)], 2
-        ),
-        first=_joined([p.first - 0.5 * s.increment for p, s in zip(parts, sightings, strict=True)]),
-        half=_joined(halves),
-        nearest=_joined([p.nearest for p in parts]),
-        spacing=_joined([p.nearest * s.increment for p, s in zip(parts, sightings, strict=True)]),
-        whole=_joined([np.stack([p.open_first, p.open_last], axis=1) for p in parts], 2) > 0,
-        points=_joined([p.points for p in parts], 2),
-        owner=_joined([p.label + b for p, b in zip(parts, base, strict=False)]).astype(int),
-        beams=tuple((p.beams, p.label + b) for p, b in zip(parts, base, strict=False)),
-        count=int(base[-1]),
+        sides=sides,
+        group=np.arange(len(sides)),
+        points=np.concatenate([np.zeros((0, 2)), *(p.points for p in parts)]),
+        owner=np.concatenate([np.zeros(0, dtype=int), *(own for _, own in beams)]),
+        beams=beams,
+        count=len(sides),
         limits=(0.5 * settings.object_width, 0.5 * longest(settings)),
         noise=float(np.hypot(settings.range_noise, SHAPE_ERROR * settings.object_width)),
     )
-    if sum(m > 0 for m in sides) < 2:
-        return found
-    return _united(found, np.repeat(np.arange(len(parts)), sides))
+    return found.united(_seen_twice(found)) if len(parts) > 1 else found
 
 
-def _united(found: Detections, sensor: np.ndarray) -> Detections:
-    """Sides of different sensors that are one object's as one."""
+def _seen_twice(found: Detections) -> np.ndarray:
+    """[d] labels, equal where different sensors see one object."""
     centre, _, body = found.placed()
-    apart = np.hypot(*(centre[:, None] - centre[None]).T).T
+    sensor = found.sides.sensor
+    apart = np.hypot(*np.moveaxis(centre[:, None] - centre[None], -1, 0))
     joined = (apart < np.maximum(body[:, None], body[None])) & (sensor[:, None] != sensor[None])
-    group = np.arange(found.count)
+    label = np.arange(found.count)
     for a, b in np.argwhere(np.triu(joined)):
-        # the lower number stays, so the outcome is one, whatever the order of the pairs
-        low, high = sorted((group[a], group[b]))
-        group[group == high] = low
-    _, group = np.unique(group, return_inverse=True)
-    return Detections(
-        group=group,
-        origin=found.origin,
-        first=found.first,
-        half=found.half,
-        nearest=found.nearest,
-        spacing=found.spacing,
-        whole=found.whole,
-        points=found.points,
-        owner=group[found.owner],
-        beams=tuple((beams, group[side]) for beams, side in found.beams),
-        count=int(group.max()) + 1,
-        limits=found.limits,
-        noise=found.noise,
-    )
-
-
-def _joined(parts: list[np.ndarray], columns: int = 0) -> np.ndarray:
-    """Arrays one after the other; an empty one of the right shape where there are none."""
-    return np.concatenate([np.zeros((0, columns) if columns else 0), *parts])
+        # the lower number stays, so that the outcome does not hang on the order of the pairs
+        low, high = sorted((label[a], label[b]))
+        label[label == high] = low
+    return label

@@ -34,6 +34,12 @@ class Bank:
         """The tracks of an index or mask."""
         return Bank(self.mean[index], self.covariance[index], self.weight[index])
 
+    def replaced(self, index: np.ndarray, new: Bank) -> Bank:
+        """These tracks, those of an index replaced."""
+        mean, covariance, weight = self.mean.copy(), self.covariance.copy(), self.weight.copy()
+        mean[index], covariance[index], weight[index] = new.mean, new.covariance, new.weight
+        return Bank(mean, covariance, weight)
+
     def joined(self, other: Bank) -> Bank:
         """These tracks, then the other's."""
         return Bank(
