@@ -10,18 +10,19 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from passpmp_ti import device, door
-from passpmp_ti.grid.stretches import LEFT_OUT, Forecast, Parts, Reach, cut
+from passpmp_ti.grid.moments import LEFT_OUT, Forecast, Moments, Reach, moments_of
 from passpmp_ti.grid.window import Window
 from passpmp_ti.kernels.chances import CHANNELS, MOST_POINTS, SCRATCH, rasterise_windows
-from passpmp_ti.kernels.risk import layer_chances
+from passpmp_ti.kernels.hazard import KINDS, lay_hazard
+from passpmp_ti.kernels.touched import layer_chances
 from passpmp_ti.robots import Robot
 from passpmp_ti.settings import Settings, integration_margin
 
 TICK = 1e-3
 """[s]"""
-SAMPLE = 0.05
+SAMPLE = 0.1
 """Length of a sample of a motion, if the time step is no longer [s]."""
-FINE = 0.6
+FINE = 0.5
 """Between two nodes of a window [standard deviations]."""
 WIDE = 4.5
 """How far beyond the disc a window's nodes reach [standard deviations]."""
@@ -44,32 +45,40 @@ class Chances:
     forecast: Forecast
     robot: Robot
     settings: Settings
-    position: tuple[float, float]
     stamp: float
+    """Of the scan [s]."""
     base_ticks: int
+    """From which ticks count [ms]."""
     anchor: tuple[float, float]
+    """From which places count [m]."""
     emergence: float
     hidden_speeds: tuple[float, ...]
-    extra: float
-    """By how much more than the body's discs are grown [m]."""
     rows: device.Array
     places: device.Array
-    slots: device.Array
     near: device.Array
     pool: device.Array
+    layers: device.Array
+    grids: device.Array
+    begins: device.Array
+    starts: device.Array
     odds: device.Array
     tally: device.Array
-    _grown: dict[float, Chances] = field(default_factory=dict, repr=False)
+    _grown: dict[Window, Chances] = field(default_factory=dict, repr=False)
 
     @property
-    def arrays(self) -> tuple[device.Array, ...]:
-        """What the kernels take, in their order."""
-        return self.rows, self.places, self.slots, self.near, self.pool, self.odds, self.tally
+    def hazard(self) -> tuple[device.Array, ...]:
+        """What the functions and kernels of kernels/risk.py take, in their order."""
+        return self.layers, self.grids, self.begins, self.starts, self.odds, self.tally
 
     @property
-    def nodes(self) -> int:
-        """Nodes of all windows; each takes 24 bytes."""
-        return self.pool.shape[0] // CHANNELS
+    def windows(self) -> tuple[device.Array, ...]:
+        """What those of kernels/printed.py take."""
+        return self.rows, self.places, self.near, self.pool, self.starts, self.odds, self.tally
+
+    @property
+    def memory(self) -> int:
+        """Bytes of windows and layers."""
+        return 4 * (self.pool.shape[0] + self.layers.shape[0])
 
     def layer(self, window: Window, ticks: device.Array, begin: float, end: float) -> np.ndarray:
         """Bound on the chance that anything touches a robot disc in each cell during [begin, end).
@@ -89,25 +98,28 @@ class Chances:
             )
         door.finite("Chances.layer", "begin", begin, least=self.stamp - 1e-9, unit="s")
         door.finite("Chances.layer", "end", end, above=begin, unit="s")
-        grown = self._about_cells(window.cell)
+        grown = self._about_cells(window)
         chances = np.zeros((window.size, window.size), dtype=np.float32)
         layer_chances(
-            ticks, *grown.arrays, *window.corner, float(window.cell),
+            ticks, *grown.windows, *window.corner, float(window.cell),
             begin / TICK - self.base_ticks, end / TICK - self.base_ticks,
             math.ceil((end - begin) / sample_steps(self.settings) / self.settings.time_step),
             chances,
         )  # fmt: skip
         return chances
 
-    def _about_cells(self, cell: float) -> Chances:
-        """The same for discs that are centred anywhere in a cell; made once."""
-        if cell not in self._grown:
-            self._grown[cell] = chances_of(
-                self.forecast, self.robot, self.settings, self.position, self.stamp,
+    def _about_cells(self, window: Window) -> Chances:
+        """The same for discs centred anywhere in a cell of the window; made once."""
+        if window not in self._grown:
+            middle = 0.5 * window.size * window.cell
+            self._grown[window] = chances_of(
+                self.forecast, self.robot, self.settings,
+                (window.origin[0] + middle, window.origin[1] + middle), self.stamp,
                 self.base_ticks, self.anchor, emergence=self.emergence,
-                hidden_speeds=self.hidden_speeds, extra=self.extra + math.sqrt(0.5) * cell,
+                hidden_speeds=self.hidden_speeds, extra=math.sqrt(0.5) * window.cell,
+                within=math.sqrt(2) * middle,
             )  # fmt: skip
-        return self._grown[cell]
+        return self._grown[window]
 
 
 @functools.lru_cache(maxsize=2)
@@ -130,9 +142,11 @@ def chances_of(
     base_ticks: int,
     anchor: tuple[float, float],
     *,
+    speed: float | None = None,
     emergence: float = 1.0,
     hidden_speeds: Sequence[float] = (1.0,),
     extra: float = 0.0,
+    within: float = 0.0,
 ) -> Chances:
     """Rasterise a forecast, where the robot can get to in time.
 
@@ -144,12 +158,15 @@ def chances_of(
         stamp: of the scan [s].
         base_ticks: from which ticks count [ms].
         anchor: from which places count [m].
+        speed: of the robot at `stamp` [m/s]; None: its top speed. The layers are the finer the
+            less far it can get.
         emergence: chance that something comes out of what is hidden.
         hidden_speeds: equally likely speeds of it, as shares of `Settings.object_speed`.
         extra: added to the discs' radii [m].
+        within: from `position` all is rasterised that is no farther [m].
 
     Raises:
-        ValueError: a forecast that is no forecast, chances outside [0, 1], or more windows than
+        ValueError: chances outside [0, 1], times that are not equally spaced, or more windows than
             memory is allowed for.
     """
     emergence = door.finite("chances_of", "emergence", emergence, least=0.0, most=1.0)
@@ -159,26 +176,36 @@ def chances_of(
             f"chances_of.hidden_speeds = {tuple(hidden_speeds)}: one share of the bound at least,"
             " each between 0 and 1"
         )
+    spacing = np.diff(forecast.times)
+    if not len(spacing) or spacing.min() <= 0 or np.ptp(spacing) > 1e-6:
+        raise ValueError(
+            f"chances_of.forecast.times must be two at least, increasing and equally spaced; got"
+            f" {forecast.times}"
+        )
     span = sample_steps(settings) * settings.time_step
     radius = body_radius(robot, settings, span) + extra + forecast.radius
-    parts = cut(forecast, radius, Reach.of(robot, position, stamp, span), anchor)
+    moments = moments_of(
+        forecast, radius, Reach.of(robot, position, stamp, speed, within), anchor
+    )
     objects, components = forecast.weight.shape
-    stretches = len(forecast.times) - 1
-    layer_ticks = (forecast.times[-1] - forecast.times[0]) / stretches / TICK
     odds = np.zeros(16 + len(speeds), dtype=np.float32)
     odds[:7] = (
-        forecast.times[0] / TICK - base_ticks, 1 / layer_ticks, LEFT_OUT, span, parts.left_out,
-        emergence, math.ceil(stamp / TICK - base_ticks - 1e-6),
+        forecast.times[0] / TICK - base_ticks, TICK / spacing[0], LEFT_OUT * objects, 0.0,
+        moments.left_out, emergence, math.ceil(stamp / TICK - base_ticks - 1e-6),
     )  # fmt: skip
     odds[16:] = speeds
     tally = np.array(
-        [objects, components, stretches, len(speeds), sample_steps(settings)], dtype=np.int32
+        [objects, components, len(moments.sides), len(speeds), sample_steps(settings)],
+        dtype=np.int32,
     )
-    rows, places, pool = rasterised(parts)
+    there = device.put(tally)
+    rows, places, pool = rasterised(moments)
+    near, grids = device.put(moments.near), device.put(moments.grids)
+    layers, begins = laid(moments, rows, places, near, pool, there, grids)
     return Chances(
-        forecast, robot, settings, (position[0], position[1]), stamp, base_ticks, anchor, emergence,
-        tuple(float(s) for s in speeds), extra, rows, places, device.put(parts.slots),
-        device.put(parts.near), pool, device.put(odds), device.put(tally),
+        forecast, robot, settings, stamp, base_ticks, anchor, emergence,
+        tuple(float(s) for s in speeds), rows, places, near, pool, layers, grids, begins,
+        device.put(moments.starts), device.put(odds), there,
     )  # fmt: skip
 
 
@@ -217,11 +244,11 @@ def points_of(sharpness: np.ndarray) -> np.ndarray:
     return np.clip(points, 8, MOST_POINTS).astype(np.int32)
 
 
-def rasterised(parts: Parts) -> tuple[device.Array, device.Array, device.Array]:
+def rasterised(moments: Moments) -> tuple[device.Array, device.Array, device.Array]:
     """(rows, places, pool) of the windows that matter."""
-    wanted = np.flatnonzero(parts.wanted)
-    deviation = parts.deviation[wanted]
-    radius = parts.radius[wanted, None]
+    wanted = np.flatnonzero(moments.wanted)
+    deviation = moments.deviation[wanted]
+    radius = moments.radius[wanted, None]
     counts = np.ceil((radius / deviation + WIDE) / FINE).astype(np.int64) + 1
     nodes = counts.prod(axis=1)
     total = int(nodes.sum())
@@ -233,13 +260,13 @@ def rasterised(parts: Parts) -> tuple[device.Array, device.Array, device.Array]:
     spacing = (radius + WIDE * deviation) / (counts - 1)
     # bilinear values fall short of the true ones by no more than this, see docs/risk.md
     margin = (1 + RING_ERROR) * (1 + ROUNDING) / np.cos(0.5 * spacing / deviation).prod(axis=1)
-    places = np.full((len(parts.wanted), 4), -1, dtype=np.int32)
+    places = np.full((len(moments.wanted), 4), -1, dtype=np.int32)
     places[wanted, 0] = np.cumsum(nodes) - nodes
     places[wanted, 1:3] = counts
-    places[wanted, 3] = points_of(parts.radius[wanted] / deviation.min(axis=1))
-    rows = parts.rows
+    places[wanted, 3] = points_of(moments.radius[wanted] / deviation.min(axis=1))
+    rows = moments.rows
     rows[wanted, 4:6] = 1 / spacing
-    shapes = np.zeros((len(parts.wanted), 6), dtype=np.float32)
+    shapes = np.zeros((len(moments.wanted), 6), dtype=np.float32)
     shapes[wanted] = np.column_stack([deviation, radius, spacing, margin])
     pool = device.empty((max(total, 1) * CHANNELS,), np.float32)
     there = device.put(places)
@@ -247,6 +274,24 @@ def rasterised(parts: Parts) -> tuple[device.Array, device.Array, device.Array]:
         scratch = scratch_memory(device.resident())
         rasterise_windows(device.share(), WORKERS, there, device.put(shapes), scratch, pool)
     return device.put(rows), there, pool
+
+
+def laid(
+    moments: Moments,
+    rows: device.Array,
+    places: device.Array,
+    near: device.Array,
+    pool: device.Array,
+    tally: device.Array,
+    grids: device.Array,
+) -> tuple[device.Array, device.Array]:
+    """(layers, begins): the windows of all objects summed up about where the robot can be."""
+    nodes = moments.sides**2
+    begins = np.stack([np.cumsum(nodes) - nodes, moments.sides], -1).astype(np.int32)
+    layers = device.empty((int(nodes.sum()) * KINDS,), np.float32)
+    there = device.put(begins)
+    lay_hazard(rows, places, near, pool, tally, grids, there, int(nodes.max()), layers)
+    return layers, there
 
 
 @functools.cache

@@ -11,24 +11,25 @@ object's place over the disc, and over its border, whose outward normal is n and
 P, Mxx and Myy are even in both coordinates, Mxy is odd in both, and g in its own: a quarter of the
 window is enough. docs/risk.md derives what is made of them, and the margins that are in them.
 
+Windows are made for each of N objects, C components and J moments, in this order.
+
 Shared parameters:
-    rows f32 [W, 22], one for each window:
+    rows f32 [N * C * J, 22], one for each window; vectors are in the window's frame:
         0, 1 mean [m], 2, 3 cosine and sine of the first axis, 4, 5 nodes a metre along each axis,
         6, 7 farther than this along an axis there is nothing [m], 8, 9 mean velocity [m/s],
         10-13 K = P_vx P_xx^-1 [1/s], 14 the part of K that is alike in all directions, times R,
         15 the rest of it, times R [m/s], 16-18 (2 / pi) Cv (xx, xy, yy) [m^2/s^2],
-        19 half the inverse of the part's least standard deviation [1/m], 20 weight times the part's
-        margin, 21 leap: 0: a part lies between its two windows; else: it is at most this times the
-        one at its end. 15 and 19-21 speak of the part that begins with the window; vectors are in
-        the window's frame
-    places i32 [W, 4]: 0 first node (-1: no window), 1, 2 nodes along each axis, 3 points of a ring
-    slots i32 [N * C * (L - 1), 2]: first row of each stretch between two layers (-1: nothing is
-        near), how many parts the stretch is cut into
-    near f32 [N * (L - 1), 3]: disc (x, y, radius) beyond which nothing of an object is in a stretch
-    odds f32 [16 + H]: 0 ticks of layer 0, 1 layers a tick, 2 what an object that is left out may
-        add [1/s], 3 sample length [s], 4 chance of components that are left out,
+        19 half the inverse of the least standard deviation [1/m], 20 weight, with the margin for
+        what lies between moments, 21 margin for what lies between a layer's nodes
+    places i32 [N * C * J, 4]: 0 first node (-1: no window), 1, 2 nodes along each axis, 3 points of
+        a ring
+    near f32 [N * J, 3]: disc (x, y, radius) beyond which nothing of an object is
+    starts i32 [L]: the moment that each layer of the forecast is
+    odds f32 [16 + H]: 0 ticks of layer 0, 1 layers a tick, 2 what objects that are left out may
+        add [1/s], 3 unused, 4 chance of components that are left out,
         5 emergence, 6 ticks at which the scan was taken, rounded up, 16- shares of the bound
-    tally i32 [5]: 0 objects, 1 components, 2 stretches, 3 hidden speeds, 4 time steps a sample
+    tally i32 [5]: 0 objects N, 1 components C, 2 moments J, 3 hidden speeds H,
+        4 time steps a sample
 """
 
 import taichi as ti
@@ -51,7 +52,8 @@ Table = ti.types.ndarray(dtype=ti.f32, ndim=2)
 Links = ti.types.ndarray(dtype=ti.i32, ndim=2)
 Numbers = ti.types.ndarray(dtype=ti.f32, ndim=1)
 vec2 = ti.types.vector(2, ti.f32)
-flow3 = ti.types.vector(3, ti.f32)
+channels6 = ti.types.vector(CHANNELS, ti.f32)
+flow8 = ti.types.vector(8, ti.f32)
 lanes = ti.types.vector(LANES, ti.f32)
 
 ERROR_OF_CHORDS = 4e-7
@@ -128,8 +130,8 @@ def raster_window(
     """Fill one window's nodes by the trapezoidal rule over its ring (periodic: see docs/risk.md).
 
     The density is a product in this frame, so its factors along each axis are worked out once. Both
-    halves of the ring share theirs along the first axis. Whatever is done is done to LANES points of
-    the ring or LANES nodes at once; those beyond the last are not asked for.
+    halves of the ring share theirs along the first axis. All is done to LANES points of the ring,
+    or LANES nodes, at once; those beyond the last are not asked for.
     """
     half = points // 2 + 1
     width = 2.0 * ti.math.pi / points
@@ -229,25 +231,9 @@ def rasterise_windows(
 
 
 @ti.func
-def flow_of(
-    rows: ti.template(),
-    places: ti.template(),
-    pool: ti.template(),
-    row,
-    mean: vec2,
-    p: vec2,
-    u: vec2,
-):
-    """(b0, Q, P) of one window at p - mean for a disc that moves at u: see docs/risk.md.
-
-    b0 is the contour integral of f, Q that of f E[(n.(v - u))^2], the rest of K left out.
-    """
-    flow = flow3(0.0)
-    c = rows[row, 2]
-    s = rows[row, 3]
-    off = p - mean
-    x = c * off[0] + s * off[1]
-    y = c * off[1] - s * off[0]
+def values_at(places: ti.template(), pool: ti.template(), rows: ti.template(), row, x, y):
+    """[6] channels of one window at (x, y) in its frame; 0 where nothing is."""
+    value = channels6(0.0)
     if places[row, 0] >= 0 and ti.abs(x) < rows[row, 6] and ti.abs(y) < rows[row, 7]:
         # beyond the last node all falls: its value bounds what is there
         nodes_y = places[row, 2]
@@ -259,89 +245,88 @@ def flow_of(
         fy -= j
         at = (places[row, 0] + i * nodes_y + j) * CHANNELS
         right = at + nodes_y * CHANNELS
-        w00 = (1.0 - fx) * (1.0 - fy)
-        w01 = (1.0 - fx) * fy
-        w10 = fx * (1.0 - fy)
-        w11 = fx * fy
-        value = ti.Vector.zero(ti.f32, CHANNELS)
         for r in ti.static(range(CHANNELS)):
-            value[r] = (
-                w00 * pool[at + r]
-                + w01 * pool[at + CHANNELS + r]
-                + w10 * pool[right + r]
-                + w11 * pool[right + CHANNELS + r]
-            )
-        sign_x = ti.select(x < 0.0, -1.0, 1.0)
-        sign_y = ti.select(y < 0.0, -1.0, 1.0)
-        wx = rows[row, 8] + rows[row, 10] * x + rows[row, 11] * y - (c * u[0] + s * u[1])
-        wy = rows[row, 9] + rows[row, 12] * x + rows[row, 13] * y - (c * u[1] - s * u[0])
-        spread = rows[row, 14]
-        b0 = value[1] + value[2]
-        q = (wx * wx + rows[row, 16]) * value[1] + (wy * wy + rows[row, 18]) * value[2]
-        q += 2.0 * (wx * wy + rows[row, 17]) * sign_x * sign_y * value[3]
-        q += spread * (2.0 * (wx * sign_x * value[4] + wy * sign_y * value[5]) + spread * b0)
-        flow = flow3(b0, ti.max(q, 0.0), value[0])
-    return flow
+            low = pool[at + r] + fy * (pool[at + CHANNELS + r] - pool[at + r])
+            high = pool[right + r] + fy * (pool[right + CHANNELS + r] - pool[right + r])
+            value[r] = low + fx * (high - low)
+        if x < 0.0:
+            value[3] = -value[3]
+            value[4] = -value[4]
+        if y < 0.0:
+            value[3] = -value[3]
+            value[5] = -value[5]
+    return value
 
 
 @ti.func
-def stretch_of(odds: ti.template(), tally: ti.template(), tick):
-    """(stretch between two layers that a time [ticks] lies in, share of it that has passed)."""
-    along = ti.max((tick - odds[0]) * odds[1], 0.0)
-    k = ti.min(ti.cast(along, ti.i32), tally[2] - 1)
-    return k, ti.min(along - k, 1.0)
-
-
-@ti.func
-def part_of(slots: ti.template(), slot, share):
-    """(row that the part of a stretch begins with, share of the part that has passed)."""
-    along = share * slots[slot, 1]
-    part = ti.min(ti.cast(along, ti.i32), slots[slot, 1] - 1)
-    return slots[slot, 0] + part, along - part
-
-
-@ti.func
-def mean_at(rows: ti.template(), row, share):
-    return vec2(
-        rows[row, 0] + share * (rows[row + 1, 0] - rows[row, 0]),
-        rows[row, 1] + share * (rows[row + 1, 1] - rows[row, 1]),
+def flow_parts(rows: ti.template(), places: ti.template(), pool: ti.template(), row, p: vec2):
+    """[8] M, G, q, rest and P of one window about its own mean, as kernels/hazard.py sums them."""
+    c = rows[row, 2]
+    s = rows[row, 3]
+    dx = p[0] - rows[row, 0]
+    dy = p[1] - rows[row, 1]
+    x = c * dx + s * dy
+    y = c * dy - s * dx
+    value = values_at(places, pool, rows, row, x, y)
+    # mean velocity at p, and what all of the ring has on top of it, outwards
+    wx = rows[row, 8] + rows[row, 10] * x + rows[row, 11] * y
+    wy = rows[row, 9] + rows[row, 12] * x + rows[row, 13] * y
+    outwards = rows[row, 14]
+    touch, xx, yy, xy, gx, gy = value[0], value[1], value[2], value[3], value[4], value[5]
+    flow_x = xx * wx + xy * wy + outwards * gx
+    flow_y = xy * wx + yy * wy + outwards * gy
+    q = wx * flow_x + wy * flow_y + outwards * (wx * gx + wy * gy + outwards * (xx + yy))
+    q += rows[row, 16] * xx + 2.0 * rows[row, 17] * xy + rows[row, 18] * yy
+    cc = c * c
+    ss = s * s
+    cs = c * s
+    return flow8(
+        cc * xx + ss * yy - 2.0 * cs * xy,
+        ss * xx + cc * yy + 2.0 * cs * xy,
+        cs * (xx - yy) + (cc - ss) * xy,
+        c * flow_x - s * flow_y,
+        s * flow_x + c * flow_y,
+        ti.max(q, 0.0),
+        rows[row, 15] * (xx + yy),
+        touch,
     )
 
 
 @ti.func
-def is_near(near: ti.template(), stretch, p: vec2):
-    x = p[0] - near[stretch, 0]
-    y = p[1] - near[stretch, 1]
-    return x * x + y * y < near[stretch, 2] * near[stretch, 2]
+def moment_of(starts: ti.template(), odds: ti.template(), tick):
+    """(moment before a time [ticks], share of the way to the next that has passed)."""
+    stretches = starts.shape[0] - 1
+    along = ti.max((tick - odds[0]) * odds[1], 0.0)
+    k = ti.min(ti.cast(along, ti.i32), stretches - 1)
+    parts = starts[k + 1] - starts[k]
+    along = ti.min(along - k, 1.0) * parts
+    part = ti.min(ti.cast(along, ti.i32), parts - 1)
+    return starts[k] + part, along - part
 
 
 @ti.func
-def between(
-    rows: ti.template(),
-    places: ti.template(),
-    pool: ti.template(),
-    row,
-    share,
-    p: vec2,
-    u: vec2,
-):
-    """`flow_of` at a share of the part that begins with `row`."""
-    mean = mean_at(rows, row, share)
-    flow = flow_of(rows, places, pool, row + 1, mean, p, u)
-    if rows[row, 21] > 0.0:
-        flow *= rows[row, 21]
-    else:
-        flow = share * flow + (1.0 - share) * flow_of(rows, places, pool, row, mean, p, u)
-    return flow
+def is_near(near: ti.template(), at, p: vec2):
+    x = p[0] - near[at, 0]
+    y = p[1] - near[at, 1]
+    return x * x + y * y < near[at, 2] * near[at, 2]
+
+
+@ti.func
+def between(rows: ti.template(), places: ti.template(), pool: ti.template(), row, share, p: vec2):
+    """`flow_parts` at a share of the way from a row's moment to the next, its mean moving along."""
+    way = vec2(rows[row + 1, 0] - rows[row, 0], rows[row + 1, 1] - rows[row, 1])
+    before = rows[row, 20] * flow_parts(rows, places, pool, row, p - share * way)
+    after = rows[row + 1, 20] * flow_parts(rows, places, pool, row + 1, p + (1.0 - share) * way)
+    return (1.0 - share) * before + share * after
 
 
 @ti.func
 def touch_chance(
     rows: ti.template(),
     places: ti.template(),
-    slots: ti.template(),
     near: ti.template(),
     pool: ti.template(),
+    starts: ti.template(),
     odds: ti.template(),
     tally: ti.template(),
     n,
@@ -349,85 +334,36 @@ def touch_chance(
     tick,
 ):
     """Bound on the chance that object n touches a disc at p at a time [ticks] (eq. 15)."""
-    k, share = stretch_of(odds, tally, tick)
+    j, share = moment_of(starts, odds, tick)
     chance = 0.0
-    if is_near(near, n * tally[2] + k, p):
+    at = n * tally[2] + j
+    if is_near(near, at, p) or is_near(near, at + 1, p):
         for c in range(tally[1]):
-            slot = (n * tally[1] + c) * tally[2] + k
-            if slots[slot, 0] >= 0:
-                row, along = part_of(slots, slot, share)
-                flow = between(rows, places, pool, row, along, p, vec2(0.0))
-                chance += rows[row, 20] * flow[2]
+            row = (n * tally[1] + c) * tally[2] + j
+            chance += between(rows, places, pool, row, share, p)[7]
     return ti.min(chance, 1.0)
-
-
-@ti.func
-def pieces_for(rows: ti.template(), row, u: vec2, span):
-    """How many equal pieces a sample of `span` seconds is looked at in: an odd number."""
-    c = rows[row, 2]
-    s = rows[row, 3]
-    x = rows[row, 8] - (c * u[0] + s * u[1])
-    y = rows[row, 9] - (c * u[1] - s * u[0])
-    turn = ti.sqrt(x * x + y * y) * span * rows[row, 19]
-    # a piece of the way is at most 1.4 standard deviations long
-    half = ti.cast(ti.ceil((turn * (1.0 / 0.7) - 1.0) * 0.5), ti.i32)
-    pieces = 2 * ti.min(ti.max(half, 0), 50) + 1
-    turn /= pieces
-    q = turn * turn
-    # tan(turn) / turn from above, for turn <= 1
-    return pieces, 1.0 + q * (1.0 / 3.0 + 0.23 * q)
 
 
 @ti.func
 def touch_flow(
     rows: ti.template(),
     places: ti.template(),
-    slots: ti.template(),
     near: ti.template(),
     pool: ti.template(),
+    starts: ti.template(),
     odds: ti.template(),
     tally: ti.template(),
     n,
     p: vec2,
-    u: vec2,
     tick,
-    before,
-    after,
 ):
-    """Half the expected number of times that object n enters or leaves a disc about a moment.
-
-    Args:
-        p: where the disc is [m].
-        u: how it moves [m/s].
-        tick: when [ticks].
-        before: time that the moment speaks for before it, and after it [s].
-    """
-    k, share = stretch_of(odds, tally, tick)
-    total = 0.0
-    if is_near(near, n * tally[2] + k, p):
+    """How often a second object n is expected to enter or leave a disc that stays at p [1/s]."""
+    j, share = moment_of(starts, odds, tick)
+    rate = 0.0
+    at = n * tally[2] + j
+    if is_near(near, at, p) or is_near(near, at + 1, p):
         for c in range(tally[1]):
-            slot = (n * tally[1] + c) * tally[2] + k
-            if slots[slot, 0] >= 0:
-                row, along = part_of(slots, slot, share)
-                pieces, margin = pieces_for(rows, row, u, 2.0 * ti.max(before, after))
-                reach = pieces // 2
-                step_before = 2.0 * before / pieces
-                step_after = 2.0 * after / pieces
-                crossings = 0.0
-                for j in range(-reach, reach + 1):
-                    length = ti.select(j < 0, step_before, step_after)
-                    weight = ti.select(j == 0, 0.5 * (step_before + step_after), length)
-                    if weight > 0.0:
-                        later = j * length
-                        if j != 0:
-                            k, share = stretch_of(odds, tally, tick + later * 1000.0)
-                            slot = (n * tally[1] + c) * tally[2] + k
-                            row = -1
-                            if slots[slot, 0] >= 0:
-                                row, along = part_of(slots, slot, share)
-                        if row >= 0:
-                            flow = between(rows, places, pool, row, along, p + later * u, u)
-                            rate = ti.sqrt(flow[0] * flow[1]) + rows[row, 15] * flow[0]
-                            crossings += weight * rows[row, 20] * rate
-                total += 0.5 * margin * crossings
-    return total
+            row = (n * tally[1] + c) * tally[2] + j
+            flow = between(rows, places, pool, row, share, p)
+            rate += ti.sqrt((flow[0] + flow[1]) * flow[5]) + flow[6]
+    return rate

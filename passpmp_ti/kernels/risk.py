@@ -10,12 +10,13 @@ A risk is carried along a motion as two numbers, so that a motion can end, be ke
         the worst counts.
 
 A robot at rest may be touched (passive safety): what happens there is not counted, and each rest
-is an end, and the next motion's start. Parameters: kernels/check.py, kernels/chances.py.
+is an end, and the next motion's start. Parameters: kernels/check.py, kernels/chances.py,
+kernels/hazard.py.
 """
 
 import taichi as ti
 
-from passpmp_ti.kernels.chances import touch_chance, touch_flow, vec2
+from passpmp_ti.kernels.chances import vec2
 from passpmp_ti.kernels.check import (
     LATEST,
     NEVER,
@@ -24,6 +25,7 @@ from passpmp_ti.kernels.check import (
     free_steps,
     robot_of,
 )
+from passpmp_ti.kernels.hazard import crossings, touch_sum
 from passpmp_ti.kernels.launch import kernel
 from passpmp_ti.kernels.motion import (
     CAR,
@@ -150,43 +152,32 @@ def disc_velocity(kind: ti.template(), robot, numbers: ti.template(), d, q):
 def touched_now(
     numbers: ti.template(),
     counts: ti.template(),
-    rows: ti.template(),
-    places: ti.template(),
-    slots: ti.template(),
-    near: ti.template(),
-    pool: ti.template(),
+    layers: ti.template(),
+    grids: ti.template(),
+    begins: ti.template(),
+    starts: ti.template(),
     odds: ti.template(),
-    tally: ti.template(),
-    first,
-    last,
     q,
     tick,
 ):
-    """Sum over objects [first, last) and discs of the chances to touch at one moment."""
+    """Sum over objects and discs of the chances to touch at one moment."""
     total = 0.0
-    for n in range(first, last):
-        for d in range(counts[5]):
-            total += touch_chance(
-                rows, places, slots, near, pool, odds, tally, n, disc_at(numbers, d, q), tick
-            )
+    for d in range(counts[5]):
+        total += touch_sum(layers, grids, begins, starts, odds, disc_at(numbers, d, q), tick)
     return total
 
 
 @ti.func
-def flow_about(
+def crossed_about(
     kind: ti.template(),
     numbers: ti.template(),
     counts: ti.template(),
     robot,
-    rows: ti.template(),
-    places: ti.template(),
-    slots: ti.template(),
-    near: ti.template(),
-    pool: ti.template(),
+    layers: ti.template(),
+    grids: ti.template(),
+    begins: ti.template(),
+    starts: ti.template(),
     odds: ti.template(),
-    tally: ti.template(),
-    first,
-    last,
     q,
     tick,
     before,
@@ -194,18 +185,12 @@ def flow_about(
 ):
     """What a moment that speaks for `before` and `after` seconds adds to TOUCH."""
     total = 0.0
-    for n in range(first, last):
-        for d in range(counts[5]):
-            total += touch_flow(
-                rows, places, slots, near, pool, odds, tally, n, disc_at(numbers, d, q),
-                disc_velocity(kind, robot, numbers, d, q), tick, before, after,
-            )  # fmt: skip
-    # objects that are too far to be looked up
-    total += (last - first) * counts[5] * odds[2] * (before + after)
-    # beyond its last layer a forecast says nothing
-    if (tick - odds[0]) * odds[1] > tally[2] + 1e-3:
-        total = 1.0
-    return total
+    for d in range(counts[5]):
+        total += crossings(
+            layers, grids, begins, starts, odds, disc_at(numbers, d, q),
+            disc_velocity(kind, robot, numbers, d, q), tick, before, after,
+        )  # fmt: skip
+    return 0.5 * total
 
 
 @ti.func
@@ -213,11 +198,10 @@ def risk_begin(
     kind: ti.template(),
     numbers: ti.template(),
     counts: ti.template(),
-    rows: ti.template(),
-    places: ti.template(),
-    slots: ti.template(),
-    near: ti.template(),
-    pool: ti.template(),
+    layers: ti.template(),
+    grids: ti.template(),
+    begins: ti.template(),
+    starts: ti.template(),
     odds: ti.template(),
     tally: ti.template(),
     q,
@@ -227,7 +211,7 @@ def risk_begin(
     risk = risk2(odds[4], NO_NEED)
     if not at_rest(kind, q):
         risk[TOUCH] += 0.5 * touched_now(
-            numbers, counts, rows, places, slots, near, pool, odds, tally, 0, tally[0], q, tick
+            numbers, counts, layers, grids, begins, starts, odds, q, tick
         )
     return risk
 
@@ -240,11 +224,10 @@ def risk_along(
     numbers: ti.template(),
     counts: ti.template(),
     robot,
-    rows: ti.template(),
-    places: ti.template(),
-    slots: ti.template(),
-    near: ti.template(),
-    pool: ti.template(),
+    layers: ti.template(),
+    grids: ti.template(),
+    begins: ti.template(),
+    starts: ti.template(),
     odds: ti.template(),
     tally: ti.template(),
     start,
@@ -285,9 +268,8 @@ def risk_along(
             if at_rest(kind, q) and not at_rest(kind, ahead):
                 moving = True
                 risk[TOUCH] += 0.5 * touched_now(
-                    numbers, counts, rows, places, slots, near, pool, odds, tally, 0, tally[0], q,
-                    tick,
-                )  # fmt: skip
+                    numbers, counts, layers, grids, begins, starts, odds, q, tick
+                )
             if moving:
                 if free == 0 and risk[NEED] >= 0.0:
                     # along a primitive speeds may grow, and no way is halved by braking
@@ -318,23 +300,22 @@ def risk_along(
                 break
         if moving:
             after = 0.5 * taken * dt
-            risk[TOUCH] += flow_about(
-                kind, numbers, counts, robot, rows, places, slots, near, pool, odds, tally, 0,
-                tally[0], sample, sample_tick, before, after,
+            risk[TOUCH] += crossed_about(
+                kind, numbers, counts, robot, layers, grids, begins, starts, odds, sample,
+                sample_tick, before, after,
             )  # fmt: skip
             before = after
             if at_rest(kind, q) or not going:
-                risk[TOUCH] += flow_about(
-                    kind, numbers, counts, robot, rows, places, slots, near, pool, odds, tally, 0,
-                    tally[0], q, tick, before, 0.0,
+                risk[TOUCH] += crossed_about(
+                    kind, numbers, counts, robot, layers, grids, begins, starts, odds, q, tick,
+                    before, 0.0,
                 )  # fmt: skip
                 before = 0.0
             if at_rest(kind, q):
                 moving = False
                 risk[TOUCH] += 0.5 * touched_now(
-                    numbers, counts, rows, places, slots, near, pool, odds, tally, 0, tally[0], q,
-                    tick,
-                )  # fmt: skip
+                    numbers, counts, layers, grids, begins, starts, odds, q, tick
+                )
         sample = q
         sample_tick = tick
         if risk[TOUCH] > most:
@@ -354,11 +335,10 @@ def risk_end(
     kind: ti.template(),
     numbers: ti.template(),
     counts: ti.template(),
-    rows: ti.template(),
-    places: ti.template(),
-    slots: ti.template(),
-    near: ti.template(),
-    pool: ti.template(),
+    layers: ti.template(),
+    grids: ti.template(),
+    begins: ti.template(),
+    starts: ti.template(),
     odds: ti.template(),
     tally: ti.template(),
     q,
@@ -369,7 +349,7 @@ def risk_end(
     whole = risk
     if not at_rest(kind, q):
         whole[TOUCH] += 0.5 * touched_now(
-            numbers, counts, rows, places, slots, near, pool, odds, tally, 0, tally[0], q, tick
+            numbers, counts, layers, grids, begins, starts, odds, q, tick
         )
     return risk_of(odds, tally, whole)
 
@@ -383,11 +363,10 @@ def least_braking_risk(
     counts: ti.template(),
     braking: ti.template(),
     robot,
-    rows: ti.template(),
-    places: ti.template(),
-    slots: ti.template(),
-    near: ti.template(),
-    pool: ti.template(),
+    layers: ti.template(),
+    grids: ti.template(),
+    begins: ti.template(),
+    starts: ti.template(),
     odds: ti.template(),
     tally: ti.template(),
     q,
@@ -400,8 +379,8 @@ def least_braking_risk(
     for b in range(counts[6]):
         if b == 0 or not at_rest(kind, q):
             whole, _, _ = risk_along(
-                kind, arrival, spans, numbers, counts, robot, rows, places, slots, near, pool,
-                odds, tally, q, tick, control_of(braking, b), 0.0, -1, least, risk,
+                kind, arrival, spans, numbers, counts, robot, layers, grids, begins, starts, odds,
+                tally, q, tick, control_of(braking, b), 0.0, -1, least, risk,
             )  # fmt: skip
             chance = risk_of(odds, tally, whole)
             # one that was not followed to its end is worse already
@@ -409,36 +388,6 @@ def least_braking_risk(
                 least = chance
                 best = b
     return least, best
-
-
-@ti.func
-def printed_chance(
-    arrival: ti.template(),
-    numbers: ti.template(),
-    counts: ti.template(),
-    rows: ti.template(),
-    places: ti.template(),
-    slots: ti.template(),
-    near: ti.template(),
-    pool: ti.template(),
-    odds: ti.template(),
-    tally: ti.template(),
-    q,
-    tick,
-):
-    """Eqs. 14 and 17 as printed: the greatest over the discs of the least over the objects. What is
-    hidden is one object more."""
-    greatest = 0.0
-    for d in range(counts[5]):
-        p = disc_at(numbers, d, q)
-        ticks = arrival_at(arrival, counts, numbers[0], p[0], p[1])
-        least = hidden_chance(odds, tally, needed_share(ticks, tick, odds[SCANNED]))
-        for n in range(tally[0]):
-            least = ti.min(
-                least, touch_chance(rows, places, slots, near, pool, odds, tally, n, p, tick)
-            )
-        greatest = ti.max(greatest, least)
-    return greatest
 
 
 @ti.func
@@ -453,17 +402,15 @@ def pose_in(poses: ti.template(), n):
 def states_risk(
     # in
     kind: ti.template(),
-    paper: ti.template(),  # eqs. 11, 12, 14 and 17 as printed
     arrival: Arrival,  # [J, I]
     spans: Spans,  # [F]
     numbers: Numbers,  # [38]
     counts: Counts,  # [15]
     braking: Table,  # [B, 3]
-    rows: Table,
-    places: Links,
-    slots: Links,
-    near: Table,
-    pool: Numbers,
+    layers: Numbers,
+    grids: Table,
+    begins: Links,
+    starts: Counts,
     odds: Numbers,
     tally: Counts,
     poses: Table,  # [N, 7]
@@ -473,154 +420,69 @@ def states_risk(
     control: Counts,  # [N]: which one that is
 ):
     for n in range(poses.shape[0]):
-        robot = robot_of(numbers)
         start = pose_in(poses, n)
-        if ti.static(paper):
-            chance[n] = 1e30
-            for b in range(counts[6]):
-                q = start
-                tick = ticks[n]
-                product = 1.0
-                going = True
-                while going:
-                    product *= printed_chance(
-                        arrival, numbers, counts, rows, places, slots, near, pool, odds, tally, q,
-                        tick,
-                    )  # fmt: skip
-                    going = not at_rest(kind, q)
-                    if going:
-                        q = step(kind, robot, q, control_of(braking, b), 0.0, numbers[1])
-                        tick += counts[4]
-                if product < chance[n]:
-                    chance[n] = product
-                    control[n] = b
-        else:
-            risk = risk_begin(
-                kind, numbers, counts, rows, places, slots, near, pool, odds, tally, start, ticks[n]
-            )
-            least, best = least_braking_risk(
-                kind, arrival, spans, numbers, counts, braking, robot, rows, places, slots, near,
-                pool, odds, tally, start, ticks[n], risk,
-            )  # fmt: skip
-            chance[n] = least
-            control[n] = best
+        risk = risk_begin(
+            kind, numbers, counts, layers, grids, begins, starts, odds, tally, start, ticks[n]
+        )
+        least, best = least_braking_risk(
+            kind, arrival, spans, numbers, counts, braking, robot_of(numbers), layers, grids,
+            begins, starts, odds, tally, start, ticks[n], risk,
+        )  # fmt: skip
+        chance[n] = least
+        control[n] = best
 
 
 @kernel
 def path_risk(
     # in
     kind: ti.template(),
-    paper: ti.template(),  # eqs. 12, 14 and 17 as printed
-    share: ti.i32,  # indices of a loop that one thread is handed at a time
     arrival: Arrival,  # [J, I]
     numbers: Numbers,  # [38]
     counts: Counts,  # [15]
-    rows: Table,
-    places: Links,
-    slots: Links,
-    near: Table,
-    pool: Numbers,
+    layers: Numbers,
+    grids: Table,
+    begins: Links,
+    starts: Counts,
     odds: Numbers,
     tally: Counts,
     poses: Table,  # [M, 7], at most a sample apart
     ticks: Counts,  # [M]
     # out
-    touch: Numbers,  # [N]: chance that each object touches the robot
-    chance: Numbers,  # [3]: that any of them does, that something hidden does, that anything does
+    share: Table,  # [M, 2]: what each pose adds to TOUCH, NEED on the way to the next
+    chance: Numbers,  # [3]: that what is tracked touches the robot, what is hidden, anything
 ):
-    """The risk of following a path while it moves; printed: the last of `chance` alone."""
-    for index in range(tally[0] * share):
-        if index % share == 0:
-            n = index // share
-            robot = robot_of(numbers)
-            total = 0.0
-            before = 0.0
-            for m in range(poses.shape[0]):
-                q = pose_in(poses, m)
-                after = 0.0
-                if m + 1 < poses.shape[0]:
-                    if not (at_rest(kind, q) and at_rest(kind, pose_in(poses, m + 1))):
-                        after = 0.5e-3 * (ticks[m + 1] - ticks[m])
-                if (before > 0.0) != (after > 0.0):
-                    total += 0.5 * touched_now(
-                        numbers, counts, rows, places, slots, near, pool, odds, tally, n, n + 1, q,
-                        ticks[m],
-                    )  # fmt: skip
-                if before + after > 0.0:
-                    total += flow_about(
-                        kind, numbers, counts, robot, rows, places, slots, near, pool, odds, tally,
-                        n, n + 1, q, ticks[m], before, after,
-                    )  # fmt: skip
-                before = after
-            touch[n] = ti.min(total, 1.0)
+    """The risk of following a path while the robot moves."""
+    for m in range(poses.shape[0]):
+        q = pose_in(poses, m)
+        before = 0.0
+        after = 0.0
+        need = NO_NEED
+        if m > 0:
+            if not (at_rest(kind, q) and at_rest(kind, pose_in(poses, m - 1))):
+                before = 0.5e-3 * (ticks[m] - ticks[m - 1])
+        if m + 1 < poses.shape[0]:
+            ahead = pose_in(poses, m + 1)
+            if not (at_rest(kind, q) and at_rest(kind, ahead)):
+                after = 0.5e-3 * (ticks[m + 1] - ticks[m])
+                need = way_need(arrival, numbers, counts, odds, q, ahead, ticks[m], NO_NEED)
+        total = 0.0
+        if (before > 0.0) != (after > 0.0):
+            total += 0.5 * touched_now(
+                numbers, counts, layers, grids, begins, starts, odds, q, ticks[m]
+            )
+        if before + after > 0.0:
+            total += crossed_about(
+                kind, numbers, counts, robot_of(numbers), layers, grids, begins, starts, odds, q,
+                ticks[m], before, after,
+            )  # fmt: skip
+        share[m, 0] = total
+        share[m, 1] = need
     ti.loop_config(serialize=True)
     for _ in range(1):
-        none = ti.max(1.0 - odds[4], 0.0)
-        for n in range(tally[0]):
-            none *= 1.0 - touch[n]
-        need = NO_NEED
-        product = 1.0
+        risk = risk2(odds[4], NO_NEED)
         for m in range(poses.shape[0]):
-            q = pose_in(poses, m)
-            if ti.static(paper):
-                product *= printed_chance(
-                    arrival, numbers, counts, rows, places, slots, near, pool, odds, tally, q,
-                    ticks[m],
-                )  # fmt: skip
-            elif m + 1 < poses.shape[0]:
-                ahead = pose_in(poses, m + 1)
-                if not (at_rest(kind, q) and at_rest(kind, ahead)):
-                    need = way_need(arrival, numbers, counts, odds, q, ahead, ticks[m], need)
-        hidden = hidden_chance(odds, tally, need)
-        chance[0] = 1.0 - none
-        chance[1] = hidden
-        chance[2] = 1.0 - none * (1.0 - hidden)
-        if ti.static(paper):
-            chance[2] = product
-
-
-@kernel
-def layer_chances(
-    # in
-    arrival: Arrival,  # [J, I]
-    rows: Table,
-    places: Links,
-    slots: Links,
-    near: Table,
-    pool: Numbers,
-    odds: Numbers,
-    tally: Counts,
-    corner_i: ti.i32,
-    corner_j: ti.i32,
-    cell: ti.f32,
-    begin: ti.f32,  # of the layer, and its end [ticks]
-    end: ti.f32,
-    looks: ti.i32,  # moments at which a layer is looked at, no more than a sample apart
-    # out
-    chances: Table,  # [J, I]
-):
-    """The chance that anything touches a robot disc that stays in a cell in [begin, end)."""
-    for j, i in chances:
-        p = vec2((i + corner_i + 0.5) * cell, (j + corner_j + 0.5) * cell)
-        still = vec2(0.0)
-        none = ti.max(1.0 - odds[4], 0.0)
-        for n in range(tally[0]):
-            total = 0.0
-            piece = (end - begin) / looks
-            for look in range(looks + 1):
-                tick = begin + look * piece
-                before = ti.select(look > 0, 0.5e-3 * piece, 0.0)
-                after = ti.select(look < looks, 0.5e-3 * piece, 0.0)
-                if look == 0 or look == looks:
-                    total += 0.5 * touch_chance(
-                        rows, places, slots, near, pool, odds, tally, n, p, tick
-                    )
-                total += touch_flow(
-                    rows, places, slots, near, pool, odds, tally, n, p, still, tick, before, after
-                )
-            total += odds[2] * 1e-3 * (end - begin)
-            none *= 1.0 - ti.min(total, 1.0)
-        # a layer does not hold its end
-        last = ti.cast(ti.ceil(end - 1e-3), ti.i32) - 1
-        need = needed_share(ti.cast(arrival[j, i], ti.i32), last, odds[SCANNED])
-        chances[j, i] = 1.0 - none * (1.0 - hidden_chance(odds, tally, need))
+            risk[TOUCH] += share[m, 0]
+            risk[NEED] = ti.min(risk[NEED], share[m, 1])
+        chance[0] = ti.min(risk[TOUCH], 1.0)
+        chance[1] = hidden_chance(odds, tally, risk[NEED])
+        chance[2] = risk_of(odds, tally, risk)
