@@ -122,17 +122,6 @@ class Chances:
         return self._grown[window]
 
 
-@functools.lru_cache(maxsize=2)
-def no_chances(resident: bool) -> tuple[device.Array, ...]:
-    """What the kernels take where no risk is weighed; `resident` as `device.resident` tells."""
-    shapes = (((1, 22), np.float32), ((1, 4), np.int32), ((1, 2), np.int32), ((1, 3), np.float32))
-    return (
-        *(device.full(shape, 0, kind) for shape, kind in shapes),
-        *(device.full(shape, 0, kind) for shape, kind in (((1,), np.float32), ((16,), np.float32))),
-        device.full((5,), 0, np.int32),
-    )
-
-
 def chances_of(
     forecast: Forecast,
     robot: Robot,

@@ -12,7 +12,7 @@ import numpy as np
 from passpmp_ti import backend, device, door
 from passpmp_ti.grid.arrival import arrival, rasterised
 from passpmp_ti.grid.body import Body, bodies, to_poses
-from passpmp_ti.grid.chances import Chances, chances_of, no_chances
+from passpmp_ti.grid.chances import Chances, chances_of
 from passpmp_ti.grid.memory import check_previous
 from passpmp_ti.grid.spans import spans_of
 from passpmp_ti.grid.static_map import StaticMap
@@ -22,6 +22,7 @@ from passpmp_ti.grid.window import Window, size_for
 from passpmp_ti.kernels.arrival import NEVER
 from passpmp_ti.kernels.beams import LOST, MOVABLE
 from passpmp_ti.kernels.check import check_path, check_states
+from passpmp_ti.kernels.printed import printed_path_risk, printed_states_risk
 from passpmp_ti.kernels.risk import path_risk, states_risk
 from passpmp_ti.kernels.visibility import (
     BLIND_SOURCES,
@@ -85,8 +86,8 @@ class FutureModel:
     """What has been brought to the host already."""
     spans: device.Array = field(init=False, repr=False)
     """[F] uint32: least and greatest ticks over blocks of cells, see kernels/spans.py."""
-    risk_arrays: tuple[device.Array, ...] = field(init=False, repr=False)
-    """Arrival times of what is hidden, their spans, and `chances`, as kernels/risk.py reads them."""
+    hidden_spans: device.Array = field(init=False, repr=False)
+    """[F] uint32: `spans` of `hidden_ticks`, where there are chances; else `spans`."""
 
     def __post_init__(self) -> None:
         if self.hidden_ticks is None:
@@ -97,11 +98,10 @@ class FutureModel:
         counts = device.put(body.placed(self.window.corner, self.window.size))
         object.__setattr__(self, "counts", counts)
         object.__setattr__(self, "spans", spans_of(self.ticks, counts, self.window.size))
-        arrays = (self.ticks, self.spans, *no_chances(device.resident()))
+        hidden_spans = self.spans
         if self.chances is not None:
             hidden_spans = spans_of(self.hidden_ticks, counts, self.window.size)
-            arrays = (self.hidden_ticks, hidden_spans, *self.chances.arrays)
-        object.__setattr__(self, "risk_arrays", arrays)
+        object.__setattr__(self, "hidden_spans", hidden_spans)
 
     @classmethod
     def from_scan(
@@ -330,11 +330,18 @@ class FutureModel:
         chance = np.zeros(len(states), dtype=np.float32)
         if not len(states):
             return chance.astype(np.float64)
-        states_risk(
-            self.there.kind, self.settings.risk == "paper", *self.risk_arrays[:2],
-            self.there.numbers, self.counts, self.there.braking, *self.risk_arrays[2:],
-            to_poses(states, self.window.anchor), ticks, chance, np.zeros(len(states), np.int32),
-        )  # fmt: skip
+        poses, control = to_poses(states, self.window.anchor), np.zeros(len(states), np.int32)
+        robot = self.there.numbers, self.counts, self.there.braking
+        if self.settings.risk == "paper":
+            printed_states_risk(
+                self.there.kind, self.hidden_ticks, *robot, *self.chances.windows, poses, ticks,
+                chance, control,
+            )  # fmt: skip
+        else:
+            states_risk(
+                self.there.kind, self.hidden_ticks, self.hidden_spans, *robot,
+                *self.chances.hazard, poses, ticks, chance, control,
+            )  # fmt: skip
         if len(self.unexplained):
             # what is seen and not tracked is there for sure, and as fast as may be
             size = (self.window.size, self.window.size)
@@ -356,12 +363,18 @@ class FutureModel:
             times: [n] absolute [s], increasing.
         """
         assert self.chances is not None
-        touch = np.zeros(max(len(self.tracks or ()), 1), dtype=np.float32)
-        chance = np.zeros(3, dtype=np.float32)
+        poses, ticks = to_poses(states, self.window.anchor), self.ticks_of(times)
+        robot = self.there.numbers, self.counts
+        if self.settings.risk == "paper":
+            each = np.zeros(len(states), dtype=np.float32)
+            printed_path_risk(
+                self.hidden_ticks, *robot, *self.chances.windows, poses, ticks, each
+            )
+            return float(min(each.prod(), 1.0))
+        share, chance = np.zeros((len(states), 2), np.float32), np.zeros(3, np.float32)
         path_risk(
-            self.there.kind, self.settings.risk == "paper", device.share(), self.hidden_ticks,
-            self.there.numbers, self.counts, *self.risk_arrays[2:],
-            to_poses(states, self.window.anchor), self.ticks_of(times), touch, chance,
+            self.there.kind, self.hidden_ticks, *robot, *self.chances.hazard, poses, ticks, share,
+            chance,
         )  # fmt: skip
         return float(min(chance[2], 1.0))
 

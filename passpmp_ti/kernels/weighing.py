@@ -7,27 +7,10 @@ that is allowed is taken: its risk bounds the least one.
 
 import taichi as ti
 
-from passpmp_ti.kernels.chances import vec2
-from passpmp_ti.kernels.check import brakes_clear, control_of, free_steps, robot_of
+from passpmp_ti.kernels.check import brakes_clear, control_of, robot_of
 from passpmp_ti.kernels.launch import kernel
-from passpmp_ti.kernels.motion import (
-    CAR,
-    X,
-    Y,
-    at_rest,
-    braking_steps,
-    heading_for,
-    speed_of,
-    step,
-)
-from passpmp_ti.kernels.risk import (
-    flow_about,
-    hidden_chance,
-    pose_in,
-    risk_begin,
-    touched_now,
-    way_need,
-)
+from passpmp_ti.kernels.motion import at_rest, braking_steps, heading_for
+from passpmp_ti.kernels.risk import pose_in, risk2, risk_along, risk_begin, risk_of
 from passpmp_ti.kernels.spans import Spans
 
 Arrival = ti.types.ndarray(dtype=ti.u16, ndim=2)
@@ -39,178 +22,10 @@ PARENT, TICK = 0, 3
 """Of a node's link, see kernels/tree.py."""
 WEIGHT = 5
 """Of a node's cost: w_ps, see there."""
-TOUCH, NEED, W_PS = 9, 10, 11
+GRAIN = 4
+"""Children that one thread weighs in one go."""
+CARRIED, W_PS = 9, 11
 """Of a child, see there."""
-OUT = 1e-3
-"""[m] for what f32 sums may be short."""
-
-
-@ti.func
-def need_along(
-    kind: ti.template(),
-    hidden: ti.template(),
-    hidden_spans: ti.template(),
-    numbers: ti.template(),
-    counts: ti.template(),
-    robot,
-    odds: ti.template(),
-    start,
-    start_tick,
-    control,
-    direction,
-    steps,
-    fastest,
-    need,
-):
-    """The least of `need` and of what a motion needs, see kernels/risk.py."""
-    q = start
-    tick = start_tick
-    least = need
-    free = 0
-    level = 2
-    k = 0
-    while k < steps and least >= 0.0:
-        if free == 0:
-            free, level = free_steps(
-                hidden_spans, numbers, counts, q, fastest, 0.0, tick, 2 * (steps - k) + 2, level
-            )
-        ahead = step(kind, robot, q, control, direction, numbers[1])
-        if free > 0:
-            free -= 1
-        else:
-            if not (at_rest(kind, q) and at_rest(kind, ahead)):
-                least = way_need(hidden, numbers, counts, odds, q, ahead, tick, least)
-            free += 1
-        q = ahead
-        tick += counts[4]
-        k += 1
-    return least
-
-
-@ti.func
-def lay_way(
-    kind: ti.template(),
-    numbers: ti.template(),
-    counts: ti.template(),
-    robot,
-    tally: ti.template(),
-    way: ti.template(),
-    base,
-    start,
-    start_tick,
-    control,
-    direction,
-    steps,
-):
-    """(samples of a motion that were written, x, y and radius of a disc that holds their places).
-
-    Rows of `way`: 0-6 pose, 7 half the time for which the robot moves before the sample, 8 after it
-    [s], 9 tick.
-    """
-    q = start
-    tick = start_tick
-    before = 0.0
-    k = 0
-    count = 0
-    going = True
-    low = vec2(start[X], start[Y])
-    high = low
-    while going:
-        ahead = q
-        taken = 0
-        moves = False
-        while taken < tally[4] and k < steps and not (moves and at_rest(kind, ahead)):
-            following = step(kind, robot, ahead, control, direction, numbers[1])
-            moves = moves or not (at_rest(kind, ahead) and at_rest(kind, following))
-            ahead = following
-            taken += 1
-            k += 1
-        after = 0.0
-        if moves:
-            after = 0.5 * taken * numbers[1]
-        if before + after > 0.0 and count < way.shape[0] - base:
-            for r in ti.static(range(7)):
-                way[base + count, r] = q[r]
-            way[base + count, 7] = before
-            way[base + count, 8] = after
-            way[base + count, 9] = tick
-            low = ti.min(low, vec2(q[X], q[Y]))
-            high = ti.max(high, vec2(q[X], q[Y]))
-            count += 1
-        before = after
-        q = ahead
-        tick += taken * counts[4]
-        going = taken > 0
-    middle = 0.5 * (low + high)
-    radius = 0.5 * (high - low).norm() + numbers[18] + OUT
-    return count, middle, radius
-
-
-@ti.func
-def comes_near(
-    near: ti.template(), odds: ti.template(), tally: ti.template(), n, p, radius, tick, end
-):
-    """Whether object n can be near a disc about p at any time in [tick, end]."""
-    first = ti.cast(ti.max((tick - odds[0]) * odds[1], 0.0), ti.i32)
-    last = ti.min(ti.cast(ti.max((end - odds[0]) * odds[1], 0.0), ti.i32), tally[2] - 1)
-    found = False
-    k = ti.min(first, tally[2] - 1)
-    while k <= last and not found:
-        at = n * tally[2] + k
-        reach = near[at, 2] + radius
-        found = (vec2(near[at, 0], near[at, 1]) - p).norm_sqr() < reach * reach
-        k += 1
-    return found
-
-
-@ti.func
-def touch_on_way(
-    kind: ti.template(),
-    numbers: ti.template(),
-    counts: ti.template(),
-    robot,
-    windows: ti.template(),
-    places: ti.template(),
-    slots: ti.template(),
-    near: ti.template(),
-    pool: ti.template(),
-    odds: ti.template(),
-    tally: ti.template(),
-    way: ti.template(),
-    base,
-    count,
-    n,
-    most,
-):
-    """What object n adds to TOUCH on a way, until that is more than `most`; see kernels/risk.py.
-
-    Rests begin and end what is counted: there, half the chance to be touching is added.
-    """
-    total = 0.0
-    i = 0
-    while i < count and total <= most:
-        q = pose_in(way, base + i)
-        before = way[base + i, 7]
-        after = way[base + i, 8]
-        tick = way[base + i, 9]
-        if comes_near(
-            near, odds, tally, n, vec2(q[X], q[Y]), numbers[18] + OUT, tick - 500.0 * before,
-            tick + 500.0 * after,
-        ):
-            if at_rest(kind, q):
-                ends = ti.select(before > 0.0, 0.5, 0.0) + ti.select(after > 0.0, 0.5, 0.0)
-                total += ends * touched_now(
-                    numbers, counts, windows, places, slots, near, pool, odds, tally, n, n + 1, q,
-                    tick,
-                )  # fmt: skip
-            total += flow_about(
-                kind, numbers, counts, robot, windows, places, slots, near, pool, odds, tally, n,
-                n + 1, q, tick, before, after,
-            )  # fmt: skip
-        else:
-            total += counts[5] * odds[2] * (before + after)
-        i += 1
-    return total
 
 
 @kernel
@@ -226,11 +41,10 @@ def weigh_children(
     controls: Table,  # [U, 3]
     hidden: Arrival,  # [J, I], this and the next ones: see kernels/risk.py
     hidden_spans: Spans,
-    windows: Table,
-    places: Links,
-    slots: Links,
-    near: Table,
-    pool: Numbers,
+    layers: Numbers,
+    grids: Table,
+    begins: Links,
+    starts: Counts,
     odds: Numbers,
     tally: Counts,
     allowed: ti.f32,  # greatest risk of a plan
@@ -238,105 +52,70 @@ def weigh_children(
     first: ti.i32,  # nodes [first, last) are the parents
     last: ti.i32,
     steps: ti.i32,
-    workers: ti.i32,
     pose: Table,
     link: Links,
-    risk: Table,  # [cap, 2] TOUCH and NEED of the parents' plans
+    risk: Table,  # [cap, 2] what the parents' plans carry on, see kernels/risk.py
     # in / out
     child: Table,  # [M, 12]
     child_proof: Counts,  # [M]
-    # scratch
-    way: Table,  # [workers x samples, 10], see `lay_way`
 ):
-    """Refuse children whose plans are too risky; `child_proof` becomes the control that is allowed.
-
-    Each worker weighs every so many children, for itself.
-    """
+    """Refuse children whose plans are too risky; `child_proof` becomes the control that is allowed."""
     per_parent = counts[7]
     children = (last - first) * per_parent
-    for index in range(workers * share):
-        worker = index // share
-        m = children
+    for index in range((children + GRAIN - 1) // GRAIN * share):
         if index % share == 0:
-            m = worker
-        base = worker * (way.shape[0] // workers)
-        while m < children:
-            if child_proof[m] > 0:
-                robot = robot_of(numbers)
-                parent = first + m // per_parent
-                q = pose_in(pose, parent)
-                tick = link[parent, TICK]
-                elapsed = (tick - link[0, TICK]) * numbers[1] / counts[4]
-                touch = risk[parent, 0]
-                need = risk[parent, 1]
-                proof = 0
-                # the primitive first, then the braking controls in turn
-                b = -1
-                while b < counts[6]:
-                    control = control_of(controls, m % per_parent)
-                    direction = heading_for(kind, q)
-                    taken = steps
-                    clear = True
-                    # no robot gains more in the time that is left
-                    gain = ti.max(ti.abs(control[1]), ti.abs(control[2]))
-                    if ti.static(kind == CAR):
-                        gain = ti.abs(control[1])
-                    if b >= 0:
-                        control = control_of(braking, b)
-                        direction = 0.0
-                        taken = braking_steps(kind, q, control, numbers[1])
-                        gain = 0.0
-                        clear = brakes_clear(
-                            kind, arrival, spans, numbers, counts, robot, q, tick, control
-                        )
-                    seconds = taken * numbers[1]
-                    bound = allowed
-                    if b >= 0:
-                        bound = ti.min(allowed, allowed_rate * (elapsed + seconds))
-                    if clear:
-                        fastest = ti.min(speed_of(kind, q) + gain * seconds, robot[0])
-                        least = need_along(
-                            kind, hidden, hidden_spans, numbers, counts, robot, odds, q, tick,
-                            control, direction, taken, fastest, need,
-                        )  # fmt: skip
-                        unhidden = 1.0 - hidden_chance(odds, tally, least)
-                        count, middle, radius = lay_way(
-                            kind, numbers, counts, robot, tally, way, base, q, tick, control,
-                            direction, taken,
-                        )  # fmt: skip
-                        total = touch
-                        n = 0
-                        while n < tally[0] and 1.0 - (1.0 - total) * unhidden <= bound:
-                            if comes_near(
-                                near, odds, tally, n, middle, radius, tick, tick + taken * counts[4]
-                            ):
-                                total += touch_on_way(
-                                    kind, numbers, counts, robot, windows, places, slots, near,
-                                    pool, odds, tally, way, base, count, n, bound - total,
-                                )  # fmt: skip
-                            else:
-                                total += counts[5] * odds[2] * seconds
-                            n += 1
-                        chance = 1.0 - (1.0 - ti.min(total, 1.0)) * unhidden
+            begin = index // share * GRAIN
+            for m in range(begin, ti.min(begin + GRAIN, children)):
+                if child_proof[m] > 0:
+                    robot = robot_of(numbers)
+                    parent = first + m // per_parent
+                    q = pose_in(pose, parent)
+                    tick = link[parent, TICK]
+                    elapsed = (tick - link[0, TICK]) * numbers[1] / counts[4]
+                    carried = risk2(risk[parent, 0], risk[parent, 1])
+                    proof = 0
+                    # the primitive first, then the braking controls in turn
+                    b = -1
+                    while b < counts[6]:
+                        control = control_of(controls, m % per_parent)
+                        direction = heading_for(kind, q)
+                        length = steps
+                        bound = allowed
+                        clear = True
+                        if b >= 0:
+                            control = control_of(braking, b)
+                            direction = 0.0
+                            length = -1
+                            seconds = braking_steps(kind, q, control, numbers[1]) * numbers[1]
+                            bound = ti.min(allowed, allowed_rate * (elapsed + seconds))
+                            clear = brakes_clear(
+                                kind, arrival, spans, numbers, counts, robot, q, tick, control
+                            )
+                        chance = 1.0
+                        whole = carried
+                        if clear:
+                            whole, _, _ = risk_along(
+                                kind, hidden, hidden_spans, numbers, counts, robot, layers, grids,
+                                begins, starts, odds, tally, q, tick, control, direction, length,
+                                bound, carried,
+                            )  # fmt: skip
+                            chance = risk_of(odds, tally, whole)
                         if b >= 0 and chance <= bound:
                             proof = b + 1
                             child[m, W_PS] = 1.0 / (1.0 - chance)
+                            b = counts[6]
                         elif b < 0 and chance <= bound:
-                            touch = total
-                            need = least
-                            child[m, TOUCH] = total
-                            child[m, NEED] = least
+                            carried = whole
+                            child[m, CARRIED] = whole[0]
+                            child[m, CARRIED + 1] = whole[1]
                             for r in ti.static(range(7)):
                                 q[r] = child[m, r]
                             tick += steps * counts[4]
-                            elapsed += seconds
-                        elif b < 0:
+                            elapsed += steps * numbers[1]
+                        elif b < 0 or at_rest(kind, q):
                             b = counts[6]  # no braking mends it
-                    b += 1
-                    if proof > 0:
-                        b = counts[6]
-                child_proof[m] = proof
-            m += workers
+                        b += 1
+                    child_proof[m] = proof
 
 
 @kernel
@@ -345,11 +124,10 @@ def begin_risk(
     kind: ti.template(),
     numbers: Numbers,  # [38]
     counts: Counts,  # [15]
-    windows: Table,
-    places: Links,
-    slots: Links,
-    near: Table,
-    pool: Numbers,
+    layers: Numbers,
+    grids: Table,
+    begins: Links,
+    starts: Counts,
     odds: Numbers,
     tally: Counts,
     pose: Table,  # [>= 1, 7], the root first
@@ -361,8 +139,8 @@ def begin_risk(
     ti.loop_config(serialize=True)
     for _ in range(1):
         begun = risk_begin(
-            kind, numbers, counts, windows, places, slots, near, pool, odds, tally,
-            pose_in(pose, 0), tick,
+            kind, numbers, counts, layers, grids, begins, starts, odds, tally, pose_in(pose, 0),
+            tick,
         )  # fmt: skip
         risk[0, 0] = begun[0]
         risk[0, 1] = begun[1]

@@ -42,8 +42,6 @@ CHUNK = 1 << 16
 GRAIN, ROADS_GRAIN, BLOCKS = 16, device.SHARE, 16
 """Children that a thread of a CPU checks in one go, the same along roads, and blocks of parents
 that are given their slots side by side."""
-WORKERS = 256
-"""That weigh risks side by side."""
 LEAST = 64
 """Parents of a chunk that is no larger than what room is left for: a launch costs as much."""
 DEVICE_CHUNK, DEVICE_BLOCKS, DEVICE_LEAST = 1 << 20, 1024, 1 << 14
@@ -243,10 +241,6 @@ class TreeGrower:
         self._grains = (1, 1) if resident else (GRAIN, ROADS_GRAIN)
         self._weighed = settings.mode == "probabilistic" and settings.risk == "any"
         self._risk = device.empty((settings.capacity if self._weighed else 1, 2), np.float32)
-        longest = max(max(settings.levels), settings.steps_of(robot.longest_braking) + 4)
-        # a sample a time step, where it is no longer than that
-        rows = WORKERS * (longest + 2) if self._weighed else 1
-        self._way = device.empty((rows, 10), np.float32)
         self._child = device.empty((self._chunk * fan, 12), np.float32)
         self._child_proof = device.empty((self._chunk * fan,), np.int32)
         self._block = device.empty((self._blocks + 1,), np.int32)
@@ -285,9 +279,12 @@ class TreeGrower:
             model.ticks, model.spans, guide.time, guide.ahead, guide.frame, body.numbers,
             model.counts, body.braking, body.controls,
         )  # fmt: skip
+        weights: tuple[device.Array, ...] = ()
         if self._weighed:
+            assert model.chances is not None
+            weights = model.hidden_ticks, model.hidden_spans, *model.chances.hazard
             begin_risk(
-                body.kind, body.numbers, model.counts, *model.risk_arrays[2:],
+                body.kind, body.numbers, model.counts, *model.chances.hazard,
                 device.put(root_pose[None]), model.ticks_of(start), self._risk,
             )  # fmt: skip
         roads = self._roads
@@ -322,10 +319,9 @@ class TreeGrower:
                     grow_level(*how, CHECK, *chunk)
                     weigh_children(
                         body.kind, device.share(), model.ticks, model.spans, body.numbers,
-                        model.counts, body.braking, body.controls, *model.risk_arrays,
+                        model.counts, body.braking, body.controls, *weights,
                         settings.allowed_risk, settings.allowed_risk_rate, first, first + parents,
-                        steps, WORKERS, *arrays[:2], self._risk, self._child, self._child_proof,
-                        self._way,
+                        steps, *arrays[:2], self._risk, self._child, self._child_proof,
                     )  # fmt: skip
                     grow_level(*how, PLACE, *chunk)
                 else:
