@@ -11,7 +11,7 @@ import pytest
 from oracle import attack, cases, exact, hidden
 
 import passpmp_ti.grid.arrival as arrival_module
-import passpmp_ti.grid.model as model_module
+import passpmp_ti.grid.proven as proven_module
 from passpmp_ti import DifferentialDrive, FutureModel, Scan, Settings
 from passpmp_ti.kernels.beams import SLACK
 
@@ -103,7 +103,7 @@ def test_the_corner_that_stands_out_between_two_beams(monkeypatch):
     )  # fmt: skip
     case = seen(exact.world_of([corner]), FINE, beams=24)
     assert broken(case) == 0
-    views_of = model_module.views_of
+    views_of = proven_module.views_of
 
     def without_half_chord(*arguments):
         views = views_of(*arguments)
@@ -111,7 +111,7 @@ def test_the_corner_that_stands_out_between_two_beams(monkeypatch):
         views.reach[0, proven] = (views.reach[0, proven] + SLACK) / (1 - 0.5 * views.view[0, 3])
         return views
 
-    monkeypatch.setattr(model_module, "views_of", without_half_chord)
+    monkeypatch.setattr(proven_module, "views_of", without_half_chord)
     assert broken(case) > 0
 
 

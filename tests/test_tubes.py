@@ -55,11 +55,9 @@ def forecast_of(settings, generator, count=3, parts=2):
 def grid_of(settings, tracks, forecast, hidden=NEVER):
     window = Window.around(0.0, 0.0, 192, settings.cell)
     tubes = module.tubes_of(tracks, forecast, ROBOT, settings, window, BASE)
-    ticks = module.overlaid(
-        np.full((192, 192), hidden, dtype=np.uint16), tubes, np.zeros((0, 2)), window, BASE, STAMP,
-        ROBOT, settings,
-    )  # fmt: skip
-    return window, ticks
+    laid = module.Laid(window, BASE, STAMP, ROBOT, settings)
+    nothing = np.zeros((192, 192), dtype=np.uint16)
+    return window, laid.tubes_over(nothing + np.uint16(hidden), tubes, nothing)
 
 
 def walks_of(settings, tracks, forecast, generator, count):
@@ -182,17 +180,26 @@ def test_slower_hidden_movers_are_asked_about_in_proportion():
     assert module.asked_speed(settings) == 0.5
     window = Window.around(0.0, 0.0, 192, settings.cell)
     hidden = np.arange(192 * 192, dtype=np.int64).reshape(192, 192).clip(0, NEVER)
-    ticks = module.overlaid(
-        hidden.astype(np.uint16), module.NO_TUBES[:0], np.zeros((0, 2)), window, BASE, STAMP,
-        ROBOT, settings,
-    ).astype(int)  # fmt: skip
-    end = int(ticks.max())
+    laid = module.Laid(window, BASE, STAMP, ROBOT, settings)
+    ticks = laid.slowed(hidden.astype(np.uint16), np.zeros((0, 2))).astype(int)
+    end = int((STAMP + module.last_braking_ends(settings, ROBOT) - BASE) * 1000)
     later = np.where(hidden == 0, 0, 2 * (hidden - 1) + 1)
-    assert (ticks <= np.minimum(later, end)).all()
+    # beyond the horizon only what the bound itself proves
+    assert (ticks <= np.maximum(np.minimum(later, end), hidden)).all()
     assert (ticks >= np.minimum(later - 2, end)).all()
     certain = settings.changed(emergence=1.0, hidden_speeds=(1.0,))
-    same = module.overlaid(
-        hidden.astype(np.uint16), module.NO_TUBES[:0], np.zeros((0, 2)), window, BASE, STAMP,
-        ROBOT, certain,
-    )  # fmt: skip
-    assert (same == np.minimum(hidden, end)).all()
+    laid = module.Laid(window, BASE, STAMP, ROBOT, certain)
+    same = laid.slowed(hidden.astype(np.uint16), np.zeros((0, 2)))
+    assert (same == hidden).all()
+
+
+def test_what_is_proven_of_anybody_stays_proven():
+    settings = settings_with()
+    tracks, forecast = forecast_of(settings, np.random.default_rng(8))
+    window = Window.around(0.0, 0.0, 192, settings.cell)
+    tubes = module.tubes_of(tracks, forecast, ROBOT, settings, window, BASE)
+    hidden = np.full((192, 192), NEVER, dtype=np.uint16)
+    strict = np.random.default_rng(9).integers(0, 9000, (192, 192)).astype(np.uint16)
+    laid = module.Laid(window, BASE, STAMP, ROBOT, settings)
+    alone = laid.tubes_over(hidden, tubes, np.zeros_like(hidden))
+    assert (laid.tubes_over(hidden, tubes, strict) == np.maximum(alone, strict)).all()

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import math
 import threading
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from passpmp_ti import device
-from passpmp_ti.grid.memory import broken_premises, remembered_ticks, without_intruders
+from passpmp_ti.grid.memory import (
+    Memory,
+    broken_premises,
+    remembered_ticks,
+    without_intruders,
+)
 from passpmp_ti.grid.opening import opened_sources
 from passpmp_ti.grid.view import Views
 from passpmp_ti.grid.window import Window
@@ -18,10 +21,6 @@ from passpmp_ti.kernels.beams import SLACK
 from passpmp_ti.kernels.visibility import BLIND_SOURCES, rasterise
 from passpmp_ti.robots import Robot
 from passpmp_ti.settings import Settings
-
-if TYPE_CHECKING:
-    from passpmp_ti.grid.model import FutureModel
-
 
 BORDER = 1
 """Cells by which two cells are nearer than their centres along each axis: any points of them."""
@@ -96,7 +95,7 @@ def arrival(
     base: int,
     robot: Robot,
     settings: Settings,
-    previous: FutureModel | None,
+    memory: Memory | None,
 ) -> tuple[device.Array, device.Array, np.ndarray]:
     """When something could first be where.
 
@@ -107,7 +106,7 @@ def arrival(
         base: whole milliseconds from which ticks count.
         robot: whose discs.
         settings: bounds and margins.
-        previous: the model of the cycle before; arrivals are never earlier than it knows.
+        memory: of the cycle before; arrivals are never earlier than it knows.
 
     Returns:
         Ticks [J, I] uint16; the marks, with the sources that are left of them where objects have a
@@ -123,19 +122,19 @@ def arrival(
 
     clearance = settings.clearance(robot)
     broken = np.zeros((0, 2))
-    memory, shift, age = remembered_ticks(previous), (0, 0), -1
-    if previous is not None:
-        age = base - previous.base_ticks
-        shift = previous.window.cells_to(window)
-        broken = broken_premises(previous, views, window, age, robot, settings)
+    remembered, shift, age = remembered_ticks(memory), (0, 0), -1
+    if memory is not None:
+        age = base - memory.base_ticks
+        shift = memory.window.cells_to(window)
+        broken = broken_premises(memory, views, window, age, robot, settings)
         if len(broken):
-            memory = without_intruders(previous, broken, age, clearance, settings)
+            remembered = without_intruders(memory, broken, age, clearance, settings)
     ticks = device.empty((window.size, window.size), np.uint16)
     blind_speed = 0.0  # nothing is asked about where nothing is marked
     if _apart(settings) and (device.resident() or not marks[BLIND_SOURCES].all()):
         blind_speed = settings.unseen_speed
     arrival_times(
-        seen, marks, left, memory, *shift, age, BORDER, _unseen_square(window.cell, clearance),
+        seen, marks, left, remembered, *shift, age, BORDER, _unseen_square(window.cell, clearance),
         int(size > 0), window.cell, clearance, settings.object_speed, blind_speed,
         settings.stamp_error, device.share(), *_scratch(window.size), ticks,
     )  # fmt: skip

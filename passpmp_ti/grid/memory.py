@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -37,7 +38,7 @@ def check_previous(previous: FutureModel, robot: Robot, settings: Settings, stam
             f"{owner} has cells of {previous.cell:g} m, settings.cell is {settings.cell:g} m;"
             " start without memory"
         )
-    if previous.settings.tracks and not settings.tracks:
+    if previous.strict_ticks is None and not settings.tracks:
         raise ValueError(
             f"{owner} left out the movers that it tracked (mode = {previous.settings.mode!r}), and"
             f" settings.mode is {settings.mode!r} now; start without memory"
@@ -68,15 +69,26 @@ def _assumptions(before: Settings, now: Settings, robot: Robot) -> list[tuple[st
     ]
 
 
-def remembered_ticks(previous: FutureModel | None) -> device.Array:
-    """What a model remembers: [J, I] uint16; one empty cell where there is no model."""
-    if previous is None:
+@dataclass(frozen=True, slots=True)
+class Memory:
+    """What a model proved, for the next one."""
+
+    ticks: device.Array
+    """[J, I] uint16 [ms]."""
+    window: Window
+    base_ticks: int
+    """From which they count [ms]."""
+
+
+def remembered_ticks(memory: Memory | None) -> device.Array:
+    """[J, I] uint16; one empty cell where nothing is remembered."""
+    if memory is None:
         return device.put(np.zeros((1, 1), dtype=np.uint16))
-    return device.put(previous.hidden_ticks)
+    return device.put(memory.ticks)
 
 
 def broken_premises(
-    previous: FutureModel,
+    memory: Memory,
     views: Views,
     window: Window,
     age: int,
@@ -94,26 +106,26 @@ def broken_premises(
         return np.zeros((0, 2))
     broken = device.empty((len(returns),), np.int32)
     contradicted(
-        device.put((returns - np.array(previous.window.anchor)).astype(np.float32)),
-        previous.hidden_ticks, age, *previous.window.corner, window.cell, radius, broken,
+        device.put((returns - np.array(memory.window.anchor)).astype(np.float32)),
+        memory.ticks, age, *memory.window.corner, window.cell, radius, broken,
     )  # fmt: skip
     return returns[device.host(broken) == 1]
 
 
 def without_intruders(
-    previous: FutureModel, broken: np.ndarray, age: int, clearance: float, settings: Settings
+    memory: Memory, broken: np.ndarray, age: int, clearance: float, settings: Settings
 ) -> device.Array:
     """Memory capped by cones from the places where a premise broke."""
-    window = previous.window
-    mask = np.ones(previous.shape, dtype=np.uint8)
+    window = memory.window
+    mask = np.ones((window.size, window.size), dtype=np.uint8)
     cells = np.floor((broken - np.array(window.origin)) / window.cell).astype(int)
     inside = ((cells >= 0) & (cells < window.size)).all(axis=1)
     mask[cells[inside, 1], cells[inside, 0]] = 0
-    remembered = device.empty(previous.shape, np.uint16)
+    remembered = device.empty((window.size, window.size), np.uint16)
     # whoever stands there reaches behind the surface that was seen
     grown = clearance + settings.object_width
     cap_memory(
-        device.put(distance_between_cells(mask)), device.put(previous.hidden_ticks), window.cell,
+        device.put(distance_between_cells(mask)), device.put(memory.ticks), window.cell,
         grown, settings.object_speed, settings.stamp_error, age, remembered,
     )  # fmt: skip
     return remembered

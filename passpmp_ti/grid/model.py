@@ -10,14 +10,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from passpmp_ti import backend, device, door
-from passpmp_ti.grid.arrival import arrival, rasterised
 from passpmp_ti.grid.body import Body, bodies, to_poses
 from passpmp_ti.grid.chances import Chances, chances_of
-from passpmp_ti.grid.memory import check_previous
+from passpmp_ti.grid.memory import Memory, check_previous
+from passpmp_ti.grid.proven import Ground, proven
 from passpmp_ti.grid.spans import spans_of
 from passpmp_ti.grid.static_map import StaticMap
-from passpmp_ti.grid.tubes import NO_TUBES, capped, layer_times, overlaid, tubes_of
-from passpmp_ti.grid.view import Labels, Views, labels_of, views_of
+from passpmp_ti.grid.tubes import Laid, capped, layer_times, tubes_of
+from passpmp_ti.grid.view import Labels, Views, labels_of
 from passpmp_ti.grid.window import Window, size_for
 from passpmp_ti.kernels.arrival import NEVER
 from passpmp_ti.kernels.beams import LOST, MOVABLE
@@ -70,6 +70,9 @@ class FutureModel:
     hidden_ticks: device.Array = None
     """[J, I] uint16 [ms], as `ticks`: when something hidden or not tracked could come, at the bound
     of speed. What the next model remembers. `ticks` themselves in conservative mode."""
+    strict_ticks: device.Array = None
+    """[J, I] uint16 [ms], as `ticks`: the same for any mover, tracked or not. None in probabilistic
+    mode, which asks nothing of it."""
     tracks: Tracks | None = None
     """The movers that are tracked; None in conservative mode."""
     chances: Chances | None = None
@@ -92,6 +95,7 @@ class FutureModel:
     def __post_init__(self) -> None:
         if self.hidden_ticks is None:
             object.__setattr__(self, "hidden_ticks", self.ticks)
+            object.__setattr__(self, "strict_ticks", self.ticks)
         body, there = bodies(self.robot, self.settings, device.resident())
         object.__setattr__(self, "body", body)
         object.__setattr__(self, "there", there)
@@ -113,6 +117,7 @@ class FutureModel:
         static_map: StaticMap | None = None,
         *,
         position: tuple[float, float, float] | None = None,
+        speed: float | None = None,
     ) -> FutureModel:
         """Build the model of what the scans saw.
 
@@ -125,6 +130,8 @@ class FutureModel:
             position: the robot's (x, y, theta) at the scan [m, m, rad]. None: the first sensor's,
                 which is right only for a sensor in the robot's middle: the robot's body is where
                 nobody else is.
+            speed: the robot's at the scan [m/s], for probabilistic mode: chances are laid where it
+                can get to. None: its top speed.
 
         Raises:
             ValueError: scans of different instants, or a previous model that is newer or was made
@@ -152,46 +159,76 @@ class FutureModel:
             window.inner_radius - math.hypot(s.pose[0] - position[0], s.pose[1] - position[1])
             for s in scans
         ]
-        labels = labels_of(scans, settings, window.anchor, reach_of, static_map)
-        tracks = _followed(labels, window, previous, settings, stamp) if settings.tracks else None
-        views = views_of(
-            labels,
-            _empty_discs(robot, settings, position, window, previous is None),
-            settings,
-            window.anchor,
-            static_map,
-            None if tracks is None else [owner >= 0 for owner in tracks.owner],
-        )
-        seen, marks = rasterised(views, window, settings)
         base = math.floor(stamp / TICK + 1e-6)
+        ground = Ground(
+            labels_of(scans, settings, window.anchor, reach_of, static_map),
+            _empty_discs(robot, settings, position, window, previous is None),
+            window, base, robot, settings, static_map,
+        )  # fmt: skip
+        if not settings.tracks:
+            strict = proven(ground, None if previous is None else previous.strict_memory)
+            return cls(
+                robot, settings, window, stamp, base, strict.ticks, strict.seen, strict.marks,
+                strict.views, strict.broken,
+            )  # fmt: skip
+        return cls._with_tracks(ground, stamp, previous, position, speed)
+
+    @classmethod
+    def _with_tracks(
+        cls,
+        ground: Ground,
+        stamp: float,
+        previous: FutureModel | None,
+        position: tuple[float, float, float],
+        speed: float | None,
+    ) -> FutureModel:
+        """Hidden movers as ever, tracked ones by their tubes or as chances."""
+        robot, settings, window = ground.robot, ground.settings, ground.window
+        base = ground.base_ticks
+        tracks = _followed(ground.labels, previous, settings, stamp)
         # memory has no cones for movers that were tracked: one that is lost may be anywhere
-        memory = None if tracks is not None and tracks.ended else previous
-        hidden, marks, broken = arrival(views, seen, marks, window, base, robot, settings, memory)
-        if tracks is None:
-            return cls(robot, settings, window, stamp, base, hidden, seen, marks, views, broken)
+        memory = None if previous is None or tracks.ended else previous.memory
+        hidden = proven(ground, memory, [owner >= 0 for owner in tracks.owner])
         forecast = tracks.forecast(layer_times(settings, robot, stamp))
-        tubes = NO_TUBES[:0]
+        laid = Laid(window, base * TICK, stamp, robot, settings)
         if settings.mode == "hybrid":
+            # what is proven of anybody whatever is proven of those who keep to their tubes
+            strict = proven(ground, None if previous is None else previous.strict_memory)
             tubes = tubes_of(tracks, forecast, robot, settings, window, base * TICK)
+            return cls(
+                robot, settings, window, stamp, base,
+                laid.tubes_over(hidden.ticks, tubes, strict.ticks), hidden.seen, hidden.marks,
+                hidden.views, strict.broken, hidden.ticks, strict.ticks, tracks,
+            )  # fmt: skip
         unexplained = np.concatenate(
             [
-                views.points(v, window.anchor)[(labels.met[v] == MOVABLE) & (owner < 0)]
-                for v, owner in enumerate(tracks.owner)
+                hidden.views.points(v, window.anchor)[(met == MOVABLE) & (owner < 0)]
+                for v, (met, owner) in enumerate(
+                    zip(ground.labels.met, tracks.owner, strict=True)
+                )
             ]
         )
-        ticks = overlaid(
-            hidden, tubes, unexplained, window, base * TICK, stamp, robot, settings
-        )
-        chances = None
-        if settings.mode == "probabilistic":
-            chances = chances_of(
-                forecast, robot, settings, position[:2], stamp, base, window.anchor,
-                emergence=settings.emergence, hidden_speeds=settings.hidden_speeds,
-            )  # fmt: skip
-        return cls(
-            robot, settings, window, stamp, base, ticks, seen, marks, views, broken, hidden,
-            tracks, chances, unexplained,
+        chances = chances_of(
+            forecast, robot, settings, position[:2], stamp, base, window.anchor, speed=speed,
+            emergence=settings.emergence, hidden_speeds=settings.hidden_speeds,
         )  # fmt: skip
+        return cls(
+            robot, settings, window, stamp, base, laid.slowed(hidden.ticks, unexplained),
+            hidden.seen, hidden.marks, hidden.views, hidden.broken, hidden.ticks, None, tracks,
+            chances, unexplained,
+        )  # fmt: skip
+
+    @property
+    def memory(self) -> Memory:
+        """What is proven of hidden and untracked movers, for the next model."""
+        return Memory(self.hidden_ticks, self.window, self.base_ticks)
+
+    @property
+    def strict_memory(self) -> Memory | None:
+        """What is proven of any mover whatever; None in probabilistic mode."""
+        if self.strict_ticks is None:
+            return None
+        return Memory(self.strict_ticks, self.window, self.base_ticks)
 
     @property
     def origin(self) -> tuple[float, float]:
@@ -482,7 +519,6 @@ def _window_for(
 
 def _followed(
     labels: Labels,
-    window: Window,
     previous: FutureModel | None,
     settings: Settings,
     stamp: float,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -137,48 +138,67 @@ def tubes_of(
     return rows[~dropped].reshape(-1, 12).astype(np.float32)
 
 
-def overlaid(
-    hidden: device.Array,
-    tubes: np.ndarray,
-    unexplained: np.ndarray,
-    window: Window,
-    base: float,
-    stamp: float,
-    robot: Robot,
-    settings: Settings,
-) -> device.Array:
-    """[J, I] uint16: what the check is asked about in the mode of `settings`.
+@dataclass(frozen=True, slots=True)
+class Laid:
+    """Lays what is asked about over the arrival times of hidden movers."""
 
-    Args:
-        hidden: [J, I] uint16 arrival times of hidden movers at the bound of speed.
-        tubes: [K, 12] of tracked ones.
-        unexplained: [n, 2] returns that may move and belong to no track [m].
-        window: where the cells lie.
-        base: from which ticks count [s].
-        stamp: of the scan [s].
-        robot: whose discs.
-        settings: mode and bounds.
-    """
-    share = asked_speed(settings)
-    stretch = 1e9 if share == 0 else 1 / share
-    # what comes later is nobody's forecast
-    end = math.floor((stamp + last_braking_ends(settings, robot) - base) / TICK)
-    asked = device.empty((window.size, window.size), np.uint16)
-    overlay(
-        device.share(), hidden, stretch, min(end, LATEST),
-        device.put(tubes if len(tubes) else NO_TUBES), len(tubes), *window.corner, window.cell,
-        asked,
-    )  # fmt: skip
-    if share < 1 and len(unexplained):
-        # they are there for sure, and nothing tells how fast
-        return capped(asked, unexplained, window, robot, settings)
-    return asked
+    window: Window
+    base: float
+    """From which ticks count [s]."""
+    stamp: float
+    """Of the scan [s]."""
+    robot: Robot
+    settings: Settings
+
+    def tubes_over(
+        self, hidden: device.Array, tubes: np.ndarray, strict: device.Array
+    ) -> device.Array:
+        """[J, I] uint16: until when a place is free of hidden movers and of those in their tubes, or
+        of any whatever.
+
+        Args:
+            hidden: [J, I] uint16 arrival times of hidden movers at the bound of speed.
+            tubes: [K, 12] of tracked ones.
+            strict: [J, I] uint16 arrival times of any mover at the bound of speed.
+        """
+        return self._over(hidden, 1.0, tubes, strict)
+
+    def slowed(self, hidden: device.Array, unexplained: np.ndarray) -> device.Array:
+        """[J, I] uint16: until when a place is free of hidden movers that are no faster than is
+        asked about, and of what is seen and not tracked.
+
+        Args:
+            hidden: as above.
+            unexplained: [n, 2] returns that may move and belong to no track [m].
+        """
+        share = asked_speed(self.settings)
+        asked = self._over(hidden, 1e9 if share == 0 else 1 / share, NO_TUBES[:0], hidden)
+        if share < 1 and len(unexplained):
+            # they are there for sure, and nothing tells how fast
+            return capped(asked, unexplained, self.window, self.robot, self.settings)
+        return asked
+
+    def _over(
+        self, hidden: device.Array, stretch: float, tubes: np.ndarray, strict: device.Array
+    ) -> device.Array:
+        settings, window = self.settings, self.window
+        # what comes later is nobody's forecast
+        end = math.floor(
+            (self.stamp + last_braking_ends(settings, self.robot) - self.base) / TICK
+        )
+        asked = device.empty((window.size, window.size), np.uint16)
+        overlay(
+            device.share(), hidden, stretch, min(end, LATEST),
+            device.put(tubes if len(tubes) else NO_TUBES), len(tubes), strict, *window.corner,
+            window.cell, asked,
+        )  # fmt: skip
+        return asked
 
 
 def capped(
     ticks: device.Array, places: np.ndarray, window: Window, robot: Robot, settings: Settings
 ) -> device.Array:
-    """[J, I] uint16: arrival times, capped by cones at the bound of speed from places [n, 2] [m]."""
+    """[J, I] uint16: arrival times, capped by cones at the bound of speed from places [n, 2]."""
     mask = np.ones((window.size, window.size), dtype=np.uint8)
     cells = np.floor((places - np.array(window.origin)) / window.cell).astype(int)
     inside = ((cells >= 0) & (cells < window.size)).all(axis=1)

@@ -72,6 +72,7 @@ def overlay(
     end: ti.i32,  # tick from which on nothing is promised
     tubes: Tubes,  # [>= count, 12]
     count: ti.i32,
+    strict: Arrival,  # [J, I] before which nothing is lost whatever
     corner_i: ti.i32,
     corner_j: ti.i32,
     cell: ti.f32,
@@ -108,3 +109,5 @@ def overlay(
                         lose(arrival, j, first, begin - 1, tick)
                         lose(arrival, j, end_ + 1, last, tick)
                         begin, end_ = ti.min(begin, first), ti.max(end_, last)
+            for i in range(arrival.shape[1]):
+                arrival[j, i] = ti.max(arrival[j, i], strict[j, i])

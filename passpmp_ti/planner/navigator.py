@@ -233,7 +233,7 @@ class Navigator:
         settings = self.settings if at_the_start else self._under_way
         return FutureModel.from_scan(
             heard.scans, self.robot, settings, self.model, None if lost else self.static_map,
-            position=(x, y, theta),
+            position=(x, y, theta), speed=abs(float(self.robot.speed(heard.state))),
         )  # fmt: skip
 
     def _alarm(self, record: CycleRecord, lost: bool, allowed: tuple[float, float]) -> str:
