@@ -25,20 +25,25 @@ SMALLEST = 1e-6
 BEND = 0.5
 """Greatest half length of a part times the root of how strongly a density is bent along time, that
 stretches between layers are cut into parts for."""
+STRAIGHT = 0.05
+"""Greatest way of a mean off the middle of those before and after, for the layer to be left out
+[standard deviations]."""
 MOST_PARTS = 8
 """That a stretch is cut into."""
 STEEPEST = 1.0
 """Bend from which on Gaussians are blurred."""
+ROUNDING = 1e-3
+"""[m] of places in single precision."""
 LOST = 1e3
 """Margin where they are bent more than any bound allows for: the risk is 1."""
 FARTHEST = 4.5
 """Standard deviations that count where a covariance shrinks."""
-NODE = 0.6
+NODE = 0.8
 """Side of a cell of the layers [standard deviations of the sharper objects]."""
 COARSEST = 1.2
 """The same of the sharpest object; what is sharper is blurred."""
 MOST_SIDE = 64
-"""Nodes along each side of a layer."""
+"""Nodes along a side of a layer."""
 ROW = 22
 
 
@@ -108,22 +113,24 @@ class Reach:
 class Moments:
     """J moments: kernels/chances.py and kernels/hazard.py say what is in their rows."""
 
+    times: np.ndarray
+    """[J] absolute [s]."""
     starts: np.ndarray
-    """[L] int32: the moment that each layer of the forecast is."""
+    """[L] int32: the last moment that is no later than each layer of the forecast."""
     rows: np.ndarray
-    """[N * C * J, 22] float32; node spacings of windows are still missing."""
+    """[J * N * C, 22] float32; node spacings of windows are still missing."""
     near: np.ndarray
-    """[N * J, 3] float32."""
+    """[J * N, 3] float32."""
     wanted: np.ndarray
-    """[N * C * J] bool: the robot may meet it."""
+    """[J * N * C] bool: the robot may meet it."""
     deviation: np.ndarray
-    """[N * C * J, 2] standard deviations along the principal axes [m]."""
+    """[J * N * C, 2] standard deviations along the principal axes [m]."""
     radius: np.ndarray
-    """[N * C * J] within which an object touches a disc [m]."""
+    """[J * N * C] within which an object touches a disc [m]."""
     grids: np.ndarray
-    """[J, 6] float32."""
+    """[J, 9] float32."""
     sides: np.ndarray
-    """[J] nodes along each side of a layer."""
+    """[2, J] nodes along the sides of a layer."""
     left_out: float
     """Sum of the weights of components that are not looked up."""
 
@@ -202,12 +209,13 @@ def moments_of(
     bends = _bends(shape, forecast.mean, forecast.covariance, length)
     met = wanted[..., 1:] | wanted[..., :-1]
     steepest = np.where(met, bends, 0.0).max(axis=(0, 1), initial=0.0)
-    counts = np.clip(np.ceil(steepest / BEND), 1, MOST_PARTS).astype(np.int64)
-
-    starts = np.concatenate([[0], np.cumsum(counts)])
-    chained = np.append(counts, 1)
-    layer = np.repeat(np.arange(layers), chained)
-    share = (np.arange(len(layer)) - starts[layer]) / chained[layer]
+    # how many moments begin with each layer: none where it can be done without
+    counts = np.append(np.clip(np.ceil(steepest / BEND), 1, MOST_PARTS).astype(np.int64), 1)
+    counts[_needless(forecast.mean, shape, steepest)] = 0
+    ends = np.cumsum(counts)
+    layer = np.repeat(np.arange(layers), counts)
+    share = (np.arange(len(layer)) - (ends - counts)[layer]) / counts[layer]
+    starts = np.where(counts > 0, ends - counts, ends - 1)
     times = forecast.times[layer] + share * length
     mean, covariance = _between(forecast.mean, forecast.covariance, layer, share, length)
     duration = np.diff(times)
@@ -217,10 +225,13 @@ def moments_of(
     wanted &= (forecast.weight >= SMALLEST)[..., None]
     # a layer is asked until the next moment
     way = reach.way(np.append(times[1:], times[-1]))
-    sharp = [plain.least[..., j][wanted[..., j]] for j in range(len(times))]
-    fine = np.array([np.quantile(s, 0.1) if len(s) else np.inf for s in sharp])
-    sides = np.clip(np.ceil(2 * way / (NODE * fine)) + 2, 4, MOST_SIDE).astype(np.int64)
-    side = 2 * way / (sides - 2)
+    low, high = _box(mean, covariance, plain, size, wanted, reach, way)
+    sharp = np.sort(np.where(wanted, plain.least, np.inf).reshape(-1, len(times)), axis=0)
+    fine = sharp[wanted.reshape(sharp.shape).sum(axis=0) // 10, np.arange(len(times))]
+    extent = high - low
+    side = np.maximum(NODE * fine, extent.max(axis=0) / (MOST_SIDE - 2))
+    side = np.where(np.isfinite(side), side, 1.0)
+    sides = np.ceil(extent / side).astype(np.int64) + 2
     floor = np.maximum(size / SHARPEST, side / COARSEST)
     shape = Shape.of(covariance, floor)
     bends = _bends(shape, mean, covariance, duration)
@@ -240,18 +251,36 @@ def moments_of(
     rows[..., 20] = forecast.weight[..., None] * margin
     rows[..., 20] *= np.where(shape.noise > 0, 1 / (1 - math.exp(-0.5 * BLUR**2)), 1.0)
     rows[..., 21] = _layer_margin(shape, side)
-    grids = _grids(rows, shape, wanted, reach, anchor, way, side)
+    grids = _grids(rows, shape, wanted, reach, anchor, way, low, side)
     return Moments(
+        times,
         starts.astype(np.int32),
-        rows.reshape(-1, ROW).astype(np.float32),
-        _near(rows, wanted).reshape(-1, 3).astype(np.float32),
-        wanted.ravel(),
-        np.stack([shape.great, shape.least], -1).reshape(-1, 2),
-        (size + BLUR * shape.noise).ravel(),
+        _moments_first(rows).reshape(-1, ROW).astype(np.float32),
+        _moments_first(_near(rows, wanted)[:, None]).reshape(-1, 3).astype(np.float32),
+        _moments_first(wanted).ravel(),
+        _moments_first(np.stack([shape.great, shape.least], -1)).reshape(-1, 2),
+        _moments_first(size + BLUR * shape.noise).ravel(),
         grids.astype(np.float32),
         sides,
         float(forecast.weight[forecast.weight < SMALLEST].sum()),
     )
+
+
+def _moments_first(array: np.ndarray) -> np.ndarray:
+    """[J, N, C, ...] of [N, C, J, ...]: what is looked up together lies together."""
+    return np.moveaxis(array, 2, 0)
+
+
+def _needless(mean: np.ndarray, shape: Shape, steepest: np.ndarray) -> list[int]:
+    """Every other layer, where means go straight on and densities hardly change."""
+    chord = mean[:, :, 1:-1, :2] - 0.5 * (mean[:, :, :-2, :2] + mean[:, :, 2:, :2])
+    off = np.hypot(chord[..., 0], chord[..., 1]) / shape.least[..., 1:-1]
+    smooth = off.max(axis=(0, 1), initial=0.0) < STRAIGHT
+    needless: list[int] = []
+    for k in range(1, len(steepest)):
+        if smooth[k - 1] and steepest[k - 1] + steepest[k] < BEND and k - 1 not in needless:
+            needless.append(k)
+    return needless
 
 
 def _rates(shape: Shape, length: np.ndarray | float) -> tuple[np.ndarray, ...]:
@@ -327,6 +356,15 @@ def _farness(
     return np.sqrt(2 * np.log(np.maximum(rate / LEFT_OUT, math.e)))
 
 
+def _width(
+    mean: np.ndarray, covariance: np.ndarray, shape: Shape, radius: np.ndarray, reach: Reach
+) -> np.ndarray:
+    """[...] how far about its mean an object is looked up, with room for what blurring adds [m]."""
+    sharp = Shape.of(covariance, np.maximum(shape.least, radius / SHARPEST))
+    far = _farness(mean, covariance, sharp, radius, reach)
+    return (1 + BLUR / SHARPEST) * radius + far * sharp.great
+
+
 def _within_reach(
     mean: np.ndarray,
     covariance: np.ndarray,
@@ -336,8 +374,7 @@ def _within_reach(
     times: np.ndarray,
 ) -> np.ndarray:
     """[N, C, J] bool: moments about which the robot may meet the object."""
-    least = Shape.of(covariance, np.maximum(shape.least, radius / SHARPEST))
-    wide = _farness(mean, covariance, least, radius, reach) * least.great + radius
+    wide = _width(mean, covariance, shape, radius, reach)
     off = mean[..., :2] - np.array(reach.position)
     way = reach.way(np.append(times[1:], times[-1]))
     return np.hypot(off[..., 0], off[..., 1]) - wide <= way
@@ -432,18 +469,45 @@ def _grids(
     reach: Reach,
     anchor: tuple[float, float],
     way: np.ndarray,
+    low: np.ndarray,
     side: np.ndarray,
 ) -> np.ndarray:
-    """[J, 6] where the layers lie, and how fast and how sharp what is in them is."""
-    grids = np.zeros((len(way), 6))
+    """[J, 9] where the layers lie, and how fast and how sharp what is in them is."""
+    grids = np.zeros((len(way), 9))
     for axis in range(2):
-        # a cell more to either side than the robot can reach
-        grids[:, axis] = reach.position[axis] - anchor[axis] - way - 0.5 * side
+        # rounding must not take the last cell away
+        grids[:, axis] = low[axis] - anchor[axis] - 0.5 * side
+        grids[:, 6 + axis] = reach.position[axis] - anchor[axis]
     grids[:, 2], grids[:, 3] = 1 / side, side
+    grids[:, 8] = (way + ROUNDING) ** 2
     speed = np.hypot(rows[..., 8], rows[..., 9])
     grids[:, 4] = np.where(wanted, 0.5 / shape.least, 0.0).max(axis=(0, 1), initial=0.0)
     grids[:, 5] = np.where(wanted, speed, 0.0).max(axis=(0, 1), initial=0.0)
     return grids
+
+
+def _box(
+    mean: np.ndarray,
+    covariance: np.ndarray,
+    shape: Shape,
+    radius: np.ndarray,
+    wanted: np.ndarray,
+    reach: Reach,
+    way: np.ndarray,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Corners ([2, J], [2, J]) of a box about all that the robot may meet, where it may be [m]."""
+    wide = _width(mean, covariance, shape, radius, reach)
+    corners = []
+    for sign in (-1.0, 1.0):
+        bounds = []
+        for axis in range(2):
+            edge = np.where(wanted, sign * mean[..., axis] + wide, -np.inf)
+            most = edge.max(axis=(0, 1), initial=-np.inf)
+            bounds.append(sign * np.minimum(most, sign * reach.position[axis] + way))
+        corners.append(np.array(bounds))
+    low, high = corners
+    met = np.all(low < high, axis=0)
+    return np.where(met, low, 0.0), np.where(met, high, 0.0)
 
 
 def _near(rows: np.ndarray, wanted: np.ndarray) -> np.ndarray:
