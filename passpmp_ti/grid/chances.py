@@ -10,7 +10,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from passpmp_ti import device, door
-from passpmp_ti.grid.moments import LEFT_OUT, Forecast, Moments, Reach, moments_of
+from passpmp_ti.grid.moments import LEFT_OUT, Forecast, Moments, moments_of
+from passpmp_ti.grid.reach import Reach
 from passpmp_ti.grid.window import Window
 from passpmp_ti.kernels.chances import CHANNELS, MOST_POINTS, SCRATCH, rasterise_windows
 from passpmp_ti.kernels.hazard import KINDS, lay_hazard
@@ -96,7 +97,7 @@ class Chances:
                 f"Chances.layer: window.anchor = {window.anchor} is not that of the chances,"
                 f" {self.anchor}; make them for this window"
             )
-        door.finite("Chances.layer", "begin", begin, least=self.stamp - 1e-9, unit="s")
+        door.finite("Chances.layer", "begin", begin, least=self.stamp - TICK, unit="s")
         door.finite("Chances.layer", "end", end, above=begin, unit="s")
         grown = self._about_cells(window)
         chances = np.zeros((window.size, window.size), dtype=np.float32)
