@@ -10,7 +10,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from passpmp_ti import device, door
-from passpmp_ti.grid.moments import LEFT_OUT, Forecast, Moments, Reach, moments_of
+from passpmp_ti.grid.moments import LEFT_OUT, Forecast, Moments, moments_of
+from passpmp_ti.grid.reach import Reach
 from passpmp_ti.grid.window import Window
 from passpmp_ti.kernels.chances import CHANNELS, MOST_POINTS, SCRATCH, rasterise_windows
 from passpmp_ti.kernels.hazard import KINDS, lay_hazard
@@ -96,7 +97,7 @@ class Chances:
                 f"Chances.layer: window.anchor = {window.anchor} is not that of the chances,"
                 f" {self.anchor}; make them for this window"
             )
-        door.finite("Chances.layer", "begin", begin, least=self.stamp - 1e-9, unit="s")
+        door.finite("Chances.layer", "begin", begin, least=self.stamp - TICK, unit="s")
         door.finite("Chances.layer", "end", end, above=begin, unit="s")
         grown = self._about_cells(window)
         chances = np.zeros((window.size, window.size), dtype=np.float32)
@@ -177,14 +178,16 @@ def chances_of(
         forecast, radius, Reach.of(robot, position, stamp, speed, within), anchor
     )
     objects, components = forecast.weight.shape
-    odds = np.zeros(16 + len(speeds), dtype=np.float32)
+    clock = 16 + len(speeds)
+    odds = np.zeros(clock + len(moments.times), dtype=np.float32)
     odds[:7] = (
-        forecast.times[0] / TICK - base_ticks, TICK / spacing[0], LEFT_OUT * objects, 0.0,
+        forecast.times[0] / TICK - base_ticks, TICK / spacing[0], LEFT_OUT * objects, clock,
         moments.left_out, emergence, math.ceil(stamp / TICK - base_ticks - 1e-6),
     )  # fmt: skip
-    odds[16:] = speeds
+    odds[16:clock] = speeds
+    odds[clock:] = moments.times / TICK - base_ticks
     tally = np.array(
-        [objects, components, len(moments.sides), len(speeds), sample_steps(settings)],
+        [objects, components, len(moments.times), len(speeds), sample_steps(settings)],
         dtype=np.int32,
     )
     there = device.put(tally)
@@ -275,8 +278,8 @@ def laid(
     grids: device.Array,
 ) -> tuple[device.Array, device.Array]:
     """(layers, begins): the windows of all objects summed up about where the robot can be."""
-    nodes = moments.sides**2
-    begins = np.stack([np.cumsum(nodes) - nodes, moments.sides], -1).astype(np.int32)
+    nodes = moments.sides.prod(axis=0)
+    begins = np.stack([np.cumsum(nodes) - nodes, *moments.sides], -1).astype(np.int32)
     layers = device.empty((int(nodes.sum()) * KINDS,), np.float32)
     there = device.put(begins)
     lay_hazard(rows, places, near, pool, tally, grids, there, int(nodes.max()), layers)

@@ -6,12 +6,13 @@ docs/risk.md derives the bounds that are used here.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
 
-from passpmp_ti.robots import Robot
+from passpmp_ti.grid.gaussians import Shape, bends_of, between
+from passpmp_ti.grid.reach import Reach
 
 SHARPEST = 16.0
 """Greatest ratio of a disc's radius to a standard deviation that windows are made for."""
@@ -25,20 +26,23 @@ SMALLEST = 1e-6
 BEND = 0.5
 """Greatest half length of a part times the root of how strongly a density is bent along time, that
 stretches between layers are cut into parts for."""
+STRAIGHT = 0.05
+"""Greatest way of a mean off the middle of those before and after, for the layer to be left out
+[standard deviations]."""
 MOST_PARTS = 8
 """That a stretch is cut into."""
 STEEPEST = 1.0
 """Bend from which on Gaussians are blurred."""
+ROUNDING = 1e-3
+"""[m] of places in single precision."""
 LOST = 1e3
 """Margin where they are bent more than any bound allows for: the risk is 1."""
-FARTHEST = 4.5
-"""Standard deviations that count where a covariance shrinks."""
-NODE = 0.6
+NODE = 0.8
 """Side of a cell of the layers [standard deviations of the sharper objects]."""
 COARSEST = 1.2
 """The same of the sharpest object; what is sharper is blurred."""
 MOST_SIDE = 64
-"""Nodes along each side of a layer."""
+"""Nodes along a side of a layer."""
 ROW = 22
 
 
@@ -58,128 +62,29 @@ class Forecast(Protocol):
 
 
 @dataclass(frozen=True, slots=True)
-class Reach:
-    """Where the robot's discs can get to."""
-
-    position: tuple[float, float]
-    """At `stamp` [m]."""
-    stamp: float
-    """[s]"""
-    speed: float
-    """At `stamp` [m/s]."""
-    acceleration: float
-    """[m/s^2]"""
-    top_speed: float
-    """[m/s]"""
-    overhang: float
-    """[m]"""
-    disc_speed: float
-    """Greatest speed of any disc [m/s]."""
-
-    @classmethod
-    def of(
-        cls,
-        robot: Robot,
-        position: tuple[float, float],
-        stamp: float,
-        speed: float | None,
-        within: float = 0.0,
-    ) -> Reach:
-        """Of a robot anywhere `within` metres of `position` that drives at `speed`; None: at its
-        top speed."""
-        return cls(
-            (position[0], position[1]),
-            stamp,
-            robot.top_speed if speed is None else abs(speed),
-            robot.deceleration,
-            robot.top_speed,
-            robot.overhang + within,
-            robot.top_speed + robot.overhang * robot.top_turn_rate,
-        )
-
-    def way(self, times: np.ndarray) -> np.ndarray:
-        """How far from `position` a disc may be by then [m]; times absolute [s]."""
-        after = np.maximum(times - self.stamp, 0.0)
-        way = self.speed * after + 0.5 * self.acceleration * after**2
-        return self.overhang + np.minimum(way, self.top_speed * after)
-
-
-@dataclass(frozen=True, slots=True)
 class Moments:
     """J moments: kernels/chances.py and kernels/hazard.py say what is in their rows."""
 
+    times: np.ndarray
+    """[J] absolute [s]."""
     starts: np.ndarray
-    """[L] int32: the moment that each layer of the forecast is."""
+    """[L] int32: the last moment that is no later than each layer of the forecast."""
     rows: np.ndarray
-    """[N * C * J, 22] float32; node spacings of windows are still missing."""
+    """[J * N * C, 22] float32; node spacings of windows are still missing."""
     near: np.ndarray
-    """[N * J, 3] float32."""
+    """[J * N, 3] float32."""
     wanted: np.ndarray
-    """[N * C * J] bool: the robot may meet it."""
+    """[J * N * C] bool: the robot may meet it."""
     deviation: np.ndarray
-    """[N * C * J, 2] standard deviations along the principal axes [m]."""
+    """[J * N * C, 2] standard deviations along the principal axes [m]."""
     radius: np.ndarray
-    """[N * C * J] within which an object touches a disc [m]."""
+    """[J * N * C] within which an object touches a disc [m]."""
     grids: np.ndarray
-    """[J, 6] float32."""
+    """[J, 9] float32."""
     sides: np.ndarray
-    """[J] nodes along each side of a layer."""
+    """[2, J] nodes along the sides of a layer."""
     left_out: float
     """Sum of the weights of components that are not looked up."""
-
-
-@dataclass(frozen=True, slots=True)
-class Shape:
-    """Gaussians of places, blurred where they are too sharp; all arrays are of one shape.
-
-    Written out for two dimensions: NumPy takes ten times as long for stacks of small matrices.
-    """
-
-    xx: np.ndarray
-    """Covariance, noise included, as `yy` and `xy` [m^2]."""
-    yy: np.ndarray
-    xy: np.ndarray
-    c: np.ndarray
-    """Cosine and sine (`s`) of the principal axis of the greater deviation."""
-    s: np.ndarray
-    great: np.ndarray
-    """Standard deviations along the principal axes [m]."""
-    least: np.ndarray
-    noise: np.ndarray
-    """Standard deviation of what they are blurred by [m]."""
-
-    @classmethod
-    def of(cls, covariance: np.ndarray, floor: np.ndarray | float) -> Shape:
-        """Of [..., 4, 4] covariances, none of whose deviations is to be below `floor` [m]."""
-        xx, yy, xy = covariance[..., 0, 0], covariance[..., 1, 1], covariance[..., 0, 1]
-        middle = 0.5 * (xx + yy)
-        greater = middle + np.hypot(0.5 * (xx - yy), xy)
-        # both make the determinant; their difference would lose the smaller one
-        smaller = np.maximum(xx * yy - xy * xy, 0.0) / greater
-        square = np.maximum(floor**2 - smaller, 0.0)
-        angle = 0.5 * np.arctan2(2 * xy, xx - yy)
-        return cls(
-            xx + square, yy + square, xy, np.cos(angle), np.sin(angle),
-            np.sqrt(greater + square), np.sqrt(smaller + square), np.sqrt(square),
-        )  # fmt: skip
-
-    def moments(self, some: slice) -> Shape:
-        """Those of some of the last axis."""
-        return Shape(*(getattr(self, f.name)[..., some] for f in fields(self)))
-
-    def along(self, xx: np.ndarray, yy: np.ndarray, xy: np.ndarray) -> tuple[np.ndarray, ...]:
-        """(xx, yy, xy) of symmetric matrices in the frames of the principal axes."""
-        cc, ss, cs = self.c * self.c, self.s * self.s, self.c * self.s
-        return (
-            cc * xx + ss * yy + 2 * cs * xy,
-            ss * xx + cc * yy - 2 * cs * xy,
-            cs * (yy - xx) + (cc - ss) * xy,
-        )
-
-    def whitened(self, xx: np.ndarray, yy: np.ndarray, xy: np.ndarray) -> tuple[np.ndarray, ...]:
-        """The same as seen from where these Gaussians are standard normal ones."""
-        xx, yy, xy = self.along(xx, yy, xy)
-        return xx / self.great**2, yy / self.least**2, xy / (self.great * self.least)
 
 
 def moments_of(
@@ -199,17 +104,18 @@ def moments_of(
     shape = Shape.of(forecast.covariance, size / SHARPEST)
     wanted = _within_reach(forecast.mean, forecast.covariance, shape, size, reach, forecast.times)
     wanted &= (forecast.weight >= SMALLEST)[..., None]
-    bends = _bends(shape, forecast.mean, forecast.covariance, length)
+    bends = bends_of(shape, forecast.mean, forecast.covariance, length)
     met = wanted[..., 1:] | wanted[..., :-1]
     steepest = np.where(met, bends, 0.0).max(axis=(0, 1), initial=0.0)
-    counts = np.clip(np.ceil(steepest / BEND), 1, MOST_PARTS).astype(np.int64)
-
-    starts = np.concatenate([[0], np.cumsum(counts)])
-    chained = np.append(counts, 1)
-    layer = np.repeat(np.arange(layers), chained)
-    share = (np.arange(len(layer)) - starts[layer]) / chained[layer]
+    # how many moments begin with each layer: none where it can be done without
+    counts = np.append(np.clip(np.ceil(steepest / BEND), 1, MOST_PARTS).astype(np.int64), 1)
+    counts[_needless(forecast.mean, shape, steepest)] = 0
+    ends = np.cumsum(counts)
+    layer = np.repeat(np.arange(layers), counts)
+    share = (np.arange(len(layer)) - (ends - counts)[layer]) / counts[layer]
+    starts = np.where(counts > 0, ends - counts, ends - 1)
     times = forecast.times[layer] + share * length
-    mean, covariance = _between(forecast.mean, forecast.covariance, layer, share, length)
+    mean, covariance = between(forecast.mean, forecast.covariance, layer, share, length)
     duration = np.diff(times)
 
     plain = Shape.of(covariance, 0.0)
@@ -217,16 +123,18 @@ def moments_of(
     wanted &= (forecast.weight >= SMALLEST)[..., None]
     # a layer is asked until the next moment
     way = reach.way(np.append(times[1:], times[-1]))
-    sharp = [plain.least[..., j][wanted[..., j]] for j in range(len(times))]
-    fine = np.array([np.quantile(s, 0.1) if len(s) else np.inf for s in sharp])
-    sides = np.clip(np.ceil(2 * way / (NODE * fine)) + 2, 4, MOST_SIDE).astype(np.int64)
-    side = 2 * way / (sides - 2)
+    low, high = _box(mean, covariance, plain, size, wanted, reach, way)
+    fine = _sharpest_tenth(np.where(wanted, plain.least, np.inf).reshape(-1, len(times)))
+    extent = high - low
+    side = np.maximum(NODE * fine, extent.max(axis=0) / (MOST_SIDE - 2))
+    side = np.where(np.isfinite(side), side, 1.0)
+    sides = np.ceil(extent / side).astype(np.int64) + 2
     floor = np.maximum(size / SHARPEST, side / COARSEST)
     shape = Shape.of(covariance, floor)
-    bends = _bends(shape, mean, covariance, duration)
+    bends = bends_of(shape, mean, covariance, duration)
     floor = np.maximum(floor, _floor(mean, covariance, bends, duration))
     shape = Shape.of(covariance, floor)
-    bends = _bends(shape, mean, covariance, duration)
+    bends = bends_of(shape, mean, covariance, duration)
     # what lies between two moments is bounded by both, and each has two neighbours
     short = np.where(bends < 1.3, 1 / np.cos(np.minimum(bends, 1.3)), LOST)
     margin = np.ones(shape.xx.shape)
@@ -240,58 +148,42 @@ def moments_of(
     rows[..., 20] = forecast.weight[..., None] * margin
     rows[..., 20] *= np.where(shape.noise > 0, 1 / (1 - math.exp(-0.5 * BLUR**2)), 1.0)
     rows[..., 21] = _layer_margin(shape, side)
-    grids = _grids(rows, shape, wanted, reach, anchor, way, side)
+    grids = _grids(rows, shape, wanted, reach, anchor, way, low, side)
     return Moments(
+        times,
         starts.astype(np.int32),
-        rows.reshape(-1, ROW).astype(np.float32),
-        _near(rows, wanted).reshape(-1, 3).astype(np.float32),
-        wanted.ravel(),
-        np.stack([shape.great, shape.least], -1).reshape(-1, 2),
-        (size + BLUR * shape.noise).ravel(),
+        _moments_first(rows).reshape(-1, ROW).astype(np.float32),
+        _moments_first(_near(rows, wanted)[:, None]).reshape(-1, 3).astype(np.float32),
+        _moments_first(wanted).ravel(),
+        _moments_first(np.stack([shape.great, shape.least], -1)).reshape(-1, 2),
+        _moments_first(size + BLUR * shape.noise).ravel(),
         grids.astype(np.float32),
         sides,
         float(forecast.weight[forecast.weight < SMALLEST].sum()),
     )
 
 
-def _rates(shape: Shape, length: np.ndarray | float) -> tuple[np.ndarray, ...]:
-    """(xx, yy, xy) at which covariances go from each moment to the next [m^2/s]."""
-    return tuple(np.diff(getattr(shape, name), axis=-1) / length for name in ("xx", "yy", "xy"))
+def _sharpest_tenth(least: np.ndarray) -> np.ndarray:
+    """[J] what a tenth of the deviations [M, J] is below; infinite ones do not count."""
+    ordered = np.sort(np.pad(least, ((0, 1), (0, 0)), constant_values=np.inf), axis=0)
+    return ordered[np.isfinite(ordered).sum(axis=0) // 10, np.arange(least.shape[1])]
 
 
-def _bends(
-    shape: Shape, mean: np.ndarray, covariance: np.ndarray, length: np.ndarray | float
-) -> np.ndarray:
-    """[..., J - 1] how strongly densities are bent, as seen from one place, between moments.
+def _moments_first(array: np.ndarray) -> np.ndarray:
+    """[J, N, C, ...] of [N, C, J, ...]: what is looked up together lies together."""
+    return np.moveaxis(array, 2, 0)
 
-    Along a time in which the mean moves evenly and the covariance goes at a constant rate and bends
-    as Pvv makes it, a Gaussian has f'' >= -k f: half of the time times the root of k.
 
-    Args:
-        shape: [..., J].
-        mean: [..., J, 4].
-        covariance: [..., J, 4, 4].
-        length: [J - 1] from each moment to the next [s].
-    """
-    strongest = np.zeros(1)
-    ends = slice(None, -1), slice(1, None)
-    rate = _rates(shape, length)
-    step = np.diff(mean[..., :2], axis=-2)
-    for end in ends:
-        at = shape.moments(end)
-        xx, yy, xy = at.whitened(*rate)
-        middle = 0.5 * (xx + yy)
-        gap = np.hypot(0.5 * (xx - yy), xy)
-        up, down = np.maximum(middle + gap, 0.0), np.maximum(gap - middle, 0.0)
-        own = up**2 + 2 * up * np.maximum(middle, 0.0) - middle**2 - gap**2
-        own += 2 * down * (up + down) * FARTHEST**2
-        pvv = covariance[..., end, 2:, 2:]
-        xx, yy, _ = at.whitened(pvv[..., 0, 0], pvv[..., 1, 1], pvv[..., 0, 1])
-        along = (at.c * step[..., 0] + at.s * step[..., 1]) / at.great
-        across = (at.c * step[..., 1] - at.s * step[..., 0]) / at.least
-        moved = np.hypot(along, across) / length
-        strongest = np.maximum(strongest, moved + np.sqrt(np.maximum(own, 0.0) + xx + yy))
-    return 0.5 * length * strongest
+def _needless(mean: np.ndarray, shape: Shape, steepest: np.ndarray) -> list[int]:
+    """Every other layer, where means go straight on and densities hardly change."""
+    chord = mean[:, :, 1:-1, :2] - 0.5 * (mean[:, :, :-2, :2] + mean[:, :, 2:, :2])
+    off = np.hypot(chord[..., 0], chord[..., 1]) / shape.least[..., 1:-1]
+    smooth = off.max(axis=(0, 1), initial=0.0) < STRAIGHT
+    needless: list[int] = []
+    for k in range(1, len(steepest)):
+        if smooth[k - 1] and steepest[k - 1] + steepest[k] < BEND and k - 1 not in needless:
+            needless.append(k)
+    return needless
 
 
 def _floor(
@@ -327,6 +219,15 @@ def _farness(
     return np.sqrt(2 * np.log(np.maximum(rate / LEFT_OUT, math.e)))
 
 
+def _width(
+    mean: np.ndarray, covariance: np.ndarray, shape: Shape, radius: np.ndarray, reach: Reach
+) -> np.ndarray:
+    """[...] how far about its mean an object is looked up, with room for what blurring adds [m]."""
+    sharp = Shape.of(covariance, np.maximum(shape.least, radius / SHARPEST))
+    far = _farness(mean, covariance, sharp, radius, reach)
+    return (1 + BLUR / SHARPEST) * radius + far * sharp.great
+
+
 def _within_reach(
     mean: np.ndarray,
     covariance: np.ndarray,
@@ -336,45 +237,10 @@ def _within_reach(
     times: np.ndarray,
 ) -> np.ndarray:
     """[N, C, J] bool: moments about which the robot may meet the object."""
-    least = Shape.of(covariance, np.maximum(shape.least, radius / SHARPEST))
-    wide = _farness(mean, covariance, least, radius, reach) * least.great + radius
+    wide = _width(mean, covariance, shape, radius, reach)
     off = mean[..., :2] - np.array(reach.position)
     way = reach.way(np.append(times[1:], times[-1]))
     return np.hypot(off[..., 0], off[..., 1]) - wide <= way
-
-
-def _between(
-    means: np.ndarray,
-    covariances: np.ndarray,
-    layer: np.ndarray,
-    share: np.ndarray,
-    length: float,
-) -> tuple[np.ndarray, np.ndarray]:
-    """Means [N, C, J, 4] and covariances [N, C, J, 4, 4] at a share of the stretch after a layer.
-
-    What a constant velocity would not make of the covariance before is put down to noise of the
-    acceleration: its parts grow as s^3, s^2 and s. Where that cannot be, the covariances are mixed.
-    """
-    after = np.minimum(layer + 1, means.shape[2] - 1)
-    mean = means[:, :, layer]
-    mean = mean + share[:, None] * (means[:, :, after] - mean)
-    first, second = covariances[:, :, layer], covariances[:, :, after]
-    covariance = first + share[:, None, None] * (second - first)
-    inner = np.flatnonzero(share > 0)
-    if len(inner):
-        start, s = first[:, :, inner], share[inner]
-        move = np.tile(np.eye(4), (len(inner), 1, 1))
-        move[:, 0, 2] = move[:, 1, 3] = length
-        noise = second[:, :, inner] - move @ start @ np.swapaxes(move, -1, -2)
-        move[:, 0, 2] = move[:, 1, 3] = s * length
-        grown = s[:, None] * np.array([1.0, 1.0, 0.0, 0.0]) + np.array([0.0, 0.0, 1.0, 1.0])
-        pushed = s[:, None, None] * noise * grown[:, :, None] * grown[:, None, :]
-        fits = np.linalg.eigvalsh(noise)[..., 0] >= -1e-9
-        drifted = move @ start @ np.swapaxes(move, -1, -2) + pushed
-        covariance[:, :, inner] = np.where(
-            fits[..., None, None], drifted, covariance[:, :, inner]
-        )
-    return mean, covariance
 
 
 def _rows(
@@ -432,18 +298,45 @@ def _grids(
     reach: Reach,
     anchor: tuple[float, float],
     way: np.ndarray,
+    low: np.ndarray,
     side: np.ndarray,
 ) -> np.ndarray:
-    """[J, 6] where the layers lie, and how fast and how sharp what is in them is."""
-    grids = np.zeros((len(way), 6))
+    """[J, 9] where the layers lie, and how fast and how sharp what is in them is."""
+    grids = np.zeros((len(way), 9))
     for axis in range(2):
-        # a cell more to either side than the robot can reach
-        grids[:, axis] = reach.position[axis] - anchor[axis] - way - 0.5 * side
+        # rounding must not take the last cell away
+        grids[:, axis] = low[axis] - anchor[axis] - 0.5 * side
+        grids[:, 6 + axis] = reach.position[axis] - anchor[axis]
     grids[:, 2], grids[:, 3] = 1 / side, side
+    grids[:, 8] = (way + ROUNDING) ** 2
     speed = np.hypot(rows[..., 8], rows[..., 9])
     grids[:, 4] = np.where(wanted, 0.5 / shape.least, 0.0).max(axis=(0, 1), initial=0.0)
     grids[:, 5] = np.where(wanted, speed, 0.0).max(axis=(0, 1), initial=0.0)
     return grids
+
+
+def _box(
+    mean: np.ndarray,
+    covariance: np.ndarray,
+    shape: Shape,
+    radius: np.ndarray,
+    wanted: np.ndarray,
+    reach: Reach,
+    way: np.ndarray,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Corners ([2, J], [2, J]) of a box about all that the robot may meet, where it may be [m]."""
+    wide = _width(mean, covariance, shape, radius, reach)
+    corners = []
+    for sign in (-1.0, 1.0):
+        bounds = []
+        for axis in range(2):
+            edge = np.where(wanted, sign * mean[..., axis] + wide, -np.inf)
+            most = edge.max(axis=(0, 1), initial=-np.inf)
+            bounds.append(sign * np.minimum(most, sign * reach.position[axis] + way))
+        corners.append(np.array(bounds))
+    low, high = corners
+    met = np.all(low < high, axis=0)
+    return np.where(met, low, 0.0), np.where(met, high, 0.0)
 
 
 def _near(rows: np.ndarray, wanted: np.ndarray) -> np.ndarray:

@@ -11,23 +11,24 @@ object's place over the disc, and over its border, whose outward normal is n and
 P, Mxx and Myy are even in both coordinates, Mxy is odd in both, and g in its own: a quarter of the
 window is enough. docs/risk.md derives what is made of them, and the margins that are in them.
 
-Windows are made for each of N objects, C components and J moments, in this order.
+Windows are made for each of J moments, N objects and C components, in this order.
 
 Shared parameters:
-    rows f32 [N * C * J, 22], one for each window; vectors are in the window's frame:
+    rows f32 [J * N * C, 22], one for each window; vectors are in the window's frame:
         0, 1 mean [m], 2, 3 cosine and sine of the first axis, 4, 5 nodes a metre along each axis,
         6, 7 farther than this along an axis there is nothing [m], 8, 9 mean velocity [m/s],
         10-13 K = P_vx P_xx^-1 [1/s], 14 the part of K that is alike in all directions, times R,
         15 the rest of it, times R [m/s], 16-18 (2 / pi) Cv (xx, xy, yy) [m^2/s^2],
         19 half the inverse of the least standard deviation [1/m], 20 weight, with the margin for
         what lies between moments, 21 margin for what lies between a layer's nodes
-    places i32 [N * C * J, 4]: 0 first node (-1: no window), 1, 2 nodes along each axis, 3 points of
+    places i32 [J * N * C, 4]: 0 first node (-1: no window), 1, 2 nodes along each axis, 3 points of
         a ring
-    near f32 [N * J, 3]: disc (x, y, radius) beyond which nothing of an object is
-    starts i32 [L]: the moment that each layer of the forecast is
-    odds f32 [16 + H]: 0 ticks of layer 0, 1 layers a tick, 2 what objects that are left out may
-        add [1/s], 3 unused, 4 chance of components that are left out,
-        5 emergence, 6 ticks at which the scan was taken, rounded up, 16- shares of the bound
+    near f32 [J * N, 3]: disc (x, y, radius) beyond which nothing of an object is
+    starts i32 [L]: the last moment that is no later than each layer of the forecast
+    odds f32 [16 + H + J]: 0 ticks of layer 0, 1 layers a tick, 2 what objects that are left out may
+        add [1/s], 3 where the ticks of the moments begin, 4 chance of components that are left out,
+        5 emergence, 6 ticks at which the scan was taken, rounded up, 16- shares of the bound, then
+        ticks of the moments
     tally i32 [5]: 0 objects N, 1 components C, 2 moments J, 3 hidden speeds H,
         4 time steps a sample
 """
@@ -295,13 +296,14 @@ def flow_parts(rows: ti.template(), places: ti.template(), pool: ti.template(), 
 @ti.func
 def moment_of(starts: ti.template(), odds: ti.template(), tick):
     """(moment before a time [ticks], share of the way to the next that has passed)."""
-    stretches = starts.shape[0] - 1
-    along = ti.max((tick - odds[0]) * odds[1], 0.0)
-    k = ti.min(ti.cast(along, ti.i32), stretches - 1)
-    parts = starts[k + 1] - starts[k]
-    along = ti.min(along - k, 1.0) * parts
-    part = ti.min(ti.cast(along, ti.i32), parts - 1)
-    return starts[k] + part, along - part
+    last = starts.shape[0] - 1
+    k = ti.cast(ti.max((tick - odds[0]) * odds[1], 0.0), ti.i32)
+    j = ti.min(starts[ti.min(k, last)], starts[last] - 1)
+    clock = ti.cast(odds[3], ti.i32)
+    while j + 1 < starts[last] and odds[clock + j + 1] <= tick:
+        j += 1
+    share = (tick - odds[clock + j]) / (odds[clock + j + 1] - odds[clock + j])
+    return j, ti.min(ti.max(share, 0.0), 1.0)
 
 
 @ti.func
@@ -312,11 +314,13 @@ def is_near(near: ti.template(), at, p: vec2):
 
 
 @ti.func
-def between(rows: ti.template(), places: ti.template(), pool: ti.template(), row, share, p: vec2):
-    """`flow_parts` at a share of the way from a row's moment to the next, its mean moving along."""
-    way = vec2(rows[row + 1, 0] - rows[row, 0], rows[row + 1, 1] - rows[row, 1])
+def between(
+    rows: ti.template(), places: ti.template(), pool: ti.template(), row, later, share, p: vec2
+):
+    """`flow_parts` at a share of the way from a row to a `later` one, its mean moving along."""
+    way = vec2(rows[later, 0] - rows[row, 0], rows[later, 1] - rows[row, 1])
     before = rows[row, 20] * flow_parts(rows, places, pool, row, p - share * way)
-    after = rows[row + 1, 20] * flow_parts(rows, places, pool, row + 1, p + (1.0 - share) * way)
+    after = rows[later, 20] * flow_parts(rows, places, pool, later, p + (1.0 - share) * way)
     return (1.0 - share) * before + share * after
 
 
@@ -336,11 +340,11 @@ def touch_chance(
     """Bound on the chance that object n touches a disc at p at a time [ticks] (eq. 15)."""
     j, share = moment_of(starts, odds, tick)
     chance = 0.0
-    at = n * tally[2] + j
-    if is_near(near, at, p) or is_near(near, at + 1, p):
+    at = j * tally[0] + n
+    if is_near(near, at, p) or is_near(near, at + tally[0], p):
         for c in range(tally[1]):
-            row = (n * tally[1] + c) * tally[2] + j
-            chance += between(rows, places, pool, row, share, p)[7]
+            row = at * tally[1] + c
+            chance += between(rows, places, pool, row, row + tally[0] * tally[1], share, p)[7]
     return ti.min(chance, 1.0)
 
 
@@ -360,10 +364,10 @@ def touch_flow(
     """How often a second object n is expected to enter or leave a disc that stays at p [1/s]."""
     j, share = moment_of(starts, odds, tick)
     rate = 0.0
-    at = n * tally[2] + j
-    if is_near(near, at, p) or is_near(near, at + 1, p):
+    at = j * tally[0] + n
+    if is_near(near, at, p) or is_near(near, at + tally[0], p):
         for c in range(tally[1]):
-            row = (n * tally[1] + c) * tally[2] + j
-            flow = between(rows, places, pool, row, share, p)
+            row = at * tally[1] + c
+            flow = between(rows, places, pool, row, row + tally[0] * tally[1], share, p)
             rate += ti.sqrt((flow[0] + flow[1]) * flow[5]) + flow[6]
     return rate

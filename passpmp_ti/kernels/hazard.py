@@ -1,7 +1,7 @@
 """Layers of hazard: how likely, and how often, any tracked object comes to touch a disc.
 
-At each moment lies a *layer*, a square of nodes about where the robot can be by then. It sums up
-the windows of all objects (kernels/chances.py): a look costs the same however many they are.
+At each moment lies a *layer*, a box of nodes where the robot can be by then, and objects too. It
+sums up the windows of all objects (kernels/chances.py): a look costs the same for any number.
 With f the density of an object's place, over the border of a disc at p:
 
     0-2: M = sum of contour integrals of f n n^T dl (xx, yy, xy) [1/m]
@@ -15,9 +15,10 @@ second (Cauchy and Schwarz, over rings, components and objects; docs/risk.md).
 
 Shared parameters, beside those of kernels/chances.py:
     layers f32 [nodes * 8]
-    grids f32 [J, 6]: 0, 1 first node (x, y) [m], 2 nodes a metre, 3 [m] between nodes,
-        4 half the inverse of the least standard deviation of what is near [1/m], 5 its speed [m/s]
-    begins i32 [J, 2]: first node of each layer, nodes along its sides
+    grids f32 [J, 9]: 0, 1 first node (x, y) [m], 2 nodes a metre, 3 [m] between nodes,
+        4 half the inverse of the least standard deviation of what is near [1/m], 5 its speed [m/s],
+        6, 7 where the robot is at the scan [m], 8 the square of how far from there it may be [m^2]
+    begins i32 [J, 3]: first node of each layer, columns, rows
 """
 
 import taichi as ti
@@ -55,15 +56,15 @@ def lay_hazard(
     for index in range(begins.shape[0] * most):
         j = index // most
         node = index % most
-        side = begins[j, 1]
-        if node < side * side:
-            p = vec2(node % side, node // side) * grids[j, 3]
+        columns = begins[j, 1]
+        if node < columns * begins[j, 2]:
+            p = vec2(node % columns, node // columns) * grids[j, 3]
             p += vec2(grids[j, 0], grids[j, 1])
             total = kinds8(0.0)
             for n in range(tally[0]):
-                if is_near(near, n * tally[2] + j, p):
+                if is_near(near, j * tally[0] + n, p):
                     for c in range(tally[1]):
-                        row = (n * tally[1] + c) * tally[2] + j
+                        row = (j * tally[0] + n) * tally[1] + c
                         total += rows[row, 20] * rows[row, 21] * flow_parts(
                             rows, places, pool, row, p
                         )
@@ -73,22 +74,24 @@ def lay_hazard(
 
 @ti.func
 def layer_at(layers: ti.template(), grids: ti.template(), begins: ti.template(), j, p: vec2):
-    """[8] of one layer, bilinear; LOST where it has no nodes."""
-    side = begins[j, 1]
+    """[8] of one layer, bilinear; nothing is beyond it, LOST where the robot cannot be."""
     fx = (p[0] - grids[j, 0]) * grids[j, 2]
     fy = (p[1] - grids[j, 1]) * grids[j, 2]
     column = ti.cast(ti.floor(fx), ti.i32)
     row = ti.cast(ti.floor(fy), ti.i32)
-    value = kinds8(LOST)
-    if column >= 0 and row >= 0 and column < side - 1 and row < side - 1:
+    value = kinds8(0.0)
+    if column >= 0 and row >= 0 and column < begins[j, 1] - 1 and row < begins[j, 2] - 1:
         fx -= column
         fy -= row
-        at = (begins[j, 0] + row * side + column) * KINDS
-        up = at + side * KINDS
+        at = (begins[j, 0] + row * begins[j, 1] + column) * KINDS
+        up = at + begins[j, 1] * KINDS
         for r in ti.static(range(KINDS)):
             low = layers[at + r] + fx * (layers[at + KINDS + r] - layers[at + r])
             high = layers[up + r] + fx * (layers[up + KINDS + r] - layers[up + r])
             value[r] = low + fy * (high - low)
+    off = p - vec2(grids[j, 6], grids[j, 7])
+    if off.dot(off) > grids[j, 8]:
+        value = kinds8(LOST)
     return value
 
 
