@@ -64,7 +64,7 @@ class Chances:
     starts: device.Array
     odds: device.Array
     tally: device.Array
-    _grown: dict[Window, Chances] = field(default_factory=dict, repr=False)
+    _over: dict[tuple[Window, float], Chances] = field(default_factory=dict, repr=False)
 
     @property
     def hazard(self) -> tuple[device.Array, ...]:
@@ -99,7 +99,8 @@ class Chances:
             )
         door.finite("Chances.layer", "begin", begin, least=self.stamp - TICK, unit="s")
         door.finite("Chances.layer", "end", end, above=begin, unit="s")
-        grown = self._about_cells(window)
+        # for discs centred anywhere in a cell
+        grown = self.over(window, math.sqrt(0.5) * window.cell)
         chances = np.zeros((window.size, window.size), dtype=np.float32)
         layer_chances(
             ticks, *grown.windows, *window.corner, float(window.cell),
@@ -109,18 +110,23 @@ class Chances:
         )  # fmt: skip
         return chances
 
-    def _about_cells(self, window: Window) -> Chances:
-        """The same for discs centred anywhere in a cell of the window; made once."""
-        if window not in self._grown:
+    def over(self, window: Window, extra: float = 0.0) -> Chances:
+        """The same for discs anywhere in a window, where the robot can get to or not; made once.
+
+        Args:
+            window: anchored as this is.
+            extra: added to the discs' radii [m].
+        """
+        key = window, extra
+        if key not in self._over:
             middle = 0.5 * window.size * window.cell
-            self._grown[window] = chances_of(
+            self._over[key] = chances_of(
                 self.forecast, self.robot, self.settings,
                 (window.origin[0] + middle, window.origin[1] + middle), self.stamp,
                 self.base_ticks, self.anchor, emergence=self.emergence,
-                hidden_speeds=self.hidden_speeds, extra=math.sqrt(0.5) * window.cell,
-                within=math.sqrt(2) * middle,
+                hidden_speeds=self.hidden_speeds, extra=extra, within=math.sqrt(2) * middle,
             )  # fmt: skip
-        return self._grown[window]
+        return self._over[key]
 
 
 def chances_of(

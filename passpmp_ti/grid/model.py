@@ -367,17 +367,18 @@ class FutureModel:
         chance = np.zeros(len(states), dtype=np.float32)
         if not len(states):
             return chance.astype(np.float64)
+        chances = self.chances.over(self.window)  # the robot need not get there in time
         poses, control = to_poses(states, self.window.anchor), np.zeros(len(states), np.int32)
         robot = self.there.numbers, self.counts, self.there.braking
         if self.settings.risk == "paper":
             printed_states_risk(
-                self.there.kind, self.hidden_ticks, *robot, *self.chances.windows, poses, ticks,
+                self.there.kind, self.hidden_ticks, *robot, *chances.windows, poses, ticks,
                 chance, control,
             )  # fmt: skip
         else:
             states_risk(
                 self.there.kind, self.hidden_ticks, self.hidden_spans, *robot,
-                *self.chances.hazard, poses, ticks, chance, control,
+                *chances.hazard, poses, ticks, chance, control,
             )  # fmt: skip
         if len(self.unexplained):
             # what is seen and not tracked is there for sure, and as fast as may be
