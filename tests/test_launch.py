@@ -1,5 +1,8 @@
 """Launches that skip Taichi's way do what it does, and refuse what it refuses."""
 
+import weakref
+from concurrent.futures import ThreadPoolExecutor
+
 import numpy as np
 import pytest
 import taichi as ti
@@ -84,6 +87,36 @@ def test_arrays_of_vectors_are_handed_over_too():
     for wrong in (given[:, :1].copy(), given.reshape(3, 4), given[0], given.reshape(2, 3, 2)):
         with pytest.raises(Exception):  # noqa: B017, PT011 - whatever Taichi raises
             summed(wrong)
+
+
+def test_what_is_kept_of_a_launch_is_never_taken_for_what_is_given():
+    out = np.empty(5, dtype=np.float32)
+    for n in range(20):
+        # a new array as a rule lies where the last one lay, and may have its name, too
+        given = values() + n
+        scaled(1, given, 1.0, 0, 0, out)
+        assert (out == given).all()
+        given[:] = n  # in place: the same array, other values
+        scaled(1, given, 1.0, 0, 0, out)
+        assert (out == n).all()
+        with pytest.raises(Exception):  # noqa: B017, PT011 - whatever Taichi raises
+            scaled(1, values(), 1.0, 0, "seed", out)
+    gone = weakref.ref(given)
+    del given
+    assert gone() is None
+
+
+def test_threads_do_not_take_each_others_arguments():
+    def work(n):
+        given, out = np.full(50, n, dtype=np.float32), np.empty(50, dtype=np.float32)
+        for _ in range(200):
+            scaled(1, given, 2.0, n, 0, out)
+            if not (out == 3 * n).all():
+                return False
+        return True
+
+    with ThreadPoolExecutor(4) as pool:
+        assert all(pool.map(work, range(8)))
 
 
 def test_what_a_kernel_returns_comes_back():

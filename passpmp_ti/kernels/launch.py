@@ -5,12 +5,15 @@ than many of our kernels run. A `kernel` of this module is Taichi's own, and its
 set of template arguments is Taichi's own call, which compiles and checks everything. Later calls
 hand their arguments straight to what was compiled, after the checks that Taichi makes too: type,
 dimensions, contiguity. Whatever is not as expected takes Taichi's way, and its errors are Taichi's.
+What a launch hands over is kept for the next one, and arrays that are still the same are not handed
+over again; so an array must not be given another shape in place. No launch keeps an array alive.
 
 This leans on parts of Taichi that its public interface does not show. Where they are missing every
 call takes Taichi's way.
 """
 
 import functools
+import weakref
 
 import numpy as np
 import taichi as ti
@@ -47,18 +50,26 @@ def kernel(function):
             result = slow(*args)
             ready[key] = _compiled(primal, args)
             return result
-        _, made, compiled = found
+        _, made, compiled, idle = found
         if compiled is None:
             return slow(*args)
-        context = made.make_launch_context()
+        # taken while it is in use, so that no other thread's launch finds it
+        context, held = idle.pop() if idle else (made.make_launch_context(), [_gone] * count)
         for place, slot, put, wanted in setters:
-            if not put(context, slot, args[place], wanted):
+            value = args[place]
+            # many arrays are those of the launch before
+            if held[place]() is value and value is not None:
+                continue
+            if not put(context, slot, value, wanted):
                 return slow(*args)
+            held[place] = weakref.ref(value) if wanted else _gone
         prog.launch_kernel(compiled, context)
-        if whole:
-            return None
-        prog.synchronize()
-        return context.get_struct_ret_int((0,))
+        result = None
+        if not whole:
+            prog.synchronize()
+            result = context.get_struct_ret_int((0,))
+        idle.append((context, held))
+        return result
 
     launch.plain = slow
     return launch
@@ -97,16 +108,22 @@ def _elements(dtype):
 
 
 def _compiled(primal, args):
-    """(program, kernel, what it was compiled to); None for the last: it takes Taichi's way."""
+    """(program, kernel, what it was compiled to, idle contexts of earlier launches with the arrays
+    that each holds); nothing compiled: it takes Taichi's way."""
     prog = impl.get_runtime().prog
     # debugging checks more than can be seen from here
     if impl.current_cfg().debug:
-        return prog, None, None
+        return prog, None, None, []
     try:
         made = primal.compiled_kernels[primal.ensure_compiled(*args)]
-        return prog, made, prog.compile_kernel(prog.config(), prog.get_device_caps(), made)
+        compiled = prog.compile_kernel(prog.config(), prog.get_device_caps(), made)
+        return prog, made, compiled, []
     except (AttributeError, KeyError, TypeError):
-        return prog, None, None
+        return prog, None, None, []
+
+
+def _gone():
+    """Like a weak reference to an array that is gone: nothing is held."""
 
 
 def _put_int(context, slot, value, _):
