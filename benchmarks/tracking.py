@@ -39,6 +39,8 @@ LAYERS = 0.1 * np.arange(1, 31)
 """Times of the forecast that is timed [s]."""
 BEAMS, RANGE = 1081, 10.0
 """Of the range finders that other recordings are seen with, as in the scenario eth."""
+FEWEST = 10
+"""Scans that a log must hold."""
 LOGS = "${PASSPMP_DATA}/lidar_carmen/README.md"
 BEYOND = 10.5
 """People come from and leave to this far outside of where they were recorded [m]."""
@@ -140,7 +142,11 @@ def accuracy(options: argparse.Namespace) -> None:
         print(row(f"`{name}`", total), flush=True)
     logs = options.log or sorted(find_data(LOGS, Path()).parent.glob("*.log.gz"))
     for path in logs:
-        print(row(f"log {path.name.split('.')[0]}", watch_log(path)), flush=True)
+        tally, name = watch_log(path), path.name.split(".")[0]
+        if len(tally.seconds) < FEWEST:
+            print(f"{path}: left out, its stamps hardly ever increase", file=sys.stderr)
+        else:
+            print(row(f"log {name}", tally), flush=True)
 
 
 def recorded_scenes(options: argparse.Namespace) -> tuple[list[Scene], list[np.ndarray]]:

@@ -17,6 +17,7 @@ from passpmp_ti.settings import Settings
 from passpmp_ti.sim.lidar import Lidar
 from passpmp_ti.sim.world import World
 from passpmp_ti.tracking import Forecast, Sighting, Tracks
+from passpmp_ti.tracking.ledger import COAST
 
 GROWN_UP = 1.0
 """Velocities of younger tracks are not judged [s]."""
@@ -82,7 +83,8 @@ class Tally:
     explained: int = 0
     seconds: list[float] = field(default_factory=list)
     tracks: list[int] = field(default_factory=list)
-    _known: dict[int, int] = field(default_factory=dict)
+    _known: dict[int, tuple[int, float]] = field(default_factory=dict)
+    """Per mover: the id of its track, and when it was last met [s]."""
 
     def count(self, tracks: Tracks, sightings: list[Sighting], seconds: float) -> None:
         """Take a cycle down; no truth is needed."""
@@ -110,9 +112,10 @@ class Tally:
         old = own[tracks.age[own] >= GROWN_UP]
         self.speed.append(np.hypot(*(tracks.velocities[old] - velocity[mine[old]]).T))
         for n in own:
-            known = self._known.get(int(mine[n]))
-            self.switches += known is not None and known != int(tracks.ids[n])
-            self._known[int(mine[n])] = int(tracks.ids[n])
+            known, met = self._known.get(int(mine[n]), (-1, -np.inf))
+            # who was away for longer than a track coasts comes back as somebody else
+            self.switches += stamp - met <= COAST and known != int(tracks.ids[n])
+            self._known[int(mine[n])] = int(tracks.ids[n]), stamp
         seen = _in_view(sightings, truth[1], movers.radius + scene.settings.range_noise + 0.02)
         self.movers_seen += int(seen.sum())
         self.movers_followed += int(seen[mine[own]].sum())
