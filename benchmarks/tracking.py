@@ -21,7 +21,7 @@ import numpy as np
 import passpmp_ti as pti
 from passpmp_ti.bench.machine import circumstances, told
 from passpmp_ti.bench.reliability import BINS, Reliability
-from passpmp_ti.bench.watched import Scene, Tally, matches, promises, sightings_of
+from passpmp_ti.bench.watched import Scene, Tally, Whose, promises, sightings_of
 from passpmp_ti.sim.data_files import find_data
 from passpmp_ti.sim.recordings import FORMATS, Recording, recorded_movers
 from passpmp_ti.sim.scenario import Scenario
@@ -61,7 +61,7 @@ def standing(scenario: Scenario, seed: int) -> tuple[Scene, float]:
 
 def watch(scene: Scene, begin: float, seconds: float, seed: int) -> Tally:
     """Follow for a while, and judge every cycle."""
-    generator, tally, tracks = np.random.default_rng(seed), Tally(), None
+    generator, tally, tracks, whose = np.random.default_rng(seed), Tally(), None, Whose()
     for k in range(round(seconds / CYCLE)):
         stamp = begin + k * CYCLE
         sightings = scene.sightings(stamp, generator)
@@ -69,7 +69,8 @@ def watch(scene: Scene, begin: float, seconds: float, seed: int) -> Tally:
         tracks = follow(tracks, sightings, stamp, scene.settings)
         tracks.forecast(stamp + LAYERS)
         tally.count(tracks, sightings, time.perf_counter() - started)
-        tally.judge(tracks, sightings, scene)
+        whose.told(tracks, sightings, scene)
+        tally.judge(tracks, sightings, scene, whose)
     return tally
 
 
@@ -192,16 +193,19 @@ def calibration(options: argparse.Namespace) -> None:
     seconds = min(options.seconds, float(last.max()) - begin)
     asked = []
     for scene in scenes:
-        tracks, settings = None, scene.settings
+        tracks, settings, whose = None, scene.settings, Whose()
         for k in range(round(seconds / CYCLE)):
             stamp = round(begin + k * CYCLE, 6)
-            tracks = follow(tracks, scene.sightings(stamp, generator), stamp, settings)
+            sightings = scene.sightings(stamp, generator)
+            tracks = follow(tracks, sightings, stamp, settings)
+            whose.told(tracks, sightings, scene)
             if k % EVERY or not len(tracks):
                 continue
-            mine = matches(tracks, scene.world, settings)
+            mine = whose.all(tracks)
             movers = scene.world.movers
             # extensions beyond the recording are straight: they would flatter
-            known = (mine >= 0) & (first[mine] <= stamp) & (stamp + AHEAD[:, None] <= last[mine])
+            known = (mine[:, 0] >= 0) & (first[mine] <= stamp).all(axis=1)
+            known = known & (stamp + AHEAD[:, None] <= last[mine].min(axis=1))
             asked += promises(
                 tracks.forecast(stamp + AHEAD),
                 movers.positions(stamp + AHEAD)[:, mine],
