@@ -21,7 +21,7 @@ import numpy as np
 import passpmp_ti as pti
 from passpmp_ti.bench.machine import circumstances, told
 from passpmp_ti.bench.reliability import BINS, Reliability
-from passpmp_ti.bench.watched import Scene, Tally, matches, promises, sightings_of
+from passpmp_ti.bench.watched import Scene, Tally, Whose, promises, sightings_of
 from passpmp_ti.sim.data_files import find_data
 from passpmp_ti.sim.recordings import FORMATS, Recording, recorded_movers
 from passpmp_ti.sim.scenario import Scenario
@@ -39,6 +39,8 @@ LAYERS = 0.1 * np.arange(1, 31)
 """Times of the forecast that is timed [s]."""
 BEAMS, RANGE = 1081, 10.0
 """Of the range finders that other recordings are seen with, as in the scenario eth."""
+FEWEST = 10
+"""Scans that a log must hold."""
 LOGS = "${PASSPMP_DATA}/lidar_carmen/README.md"
 BEYOND = 10.5
 """People come from and leave to this far outside of where they were recorded [m]."""
@@ -59,7 +61,7 @@ def standing(scenario: Scenario, seed: int) -> tuple[Scene, float]:
 
 def watch(scene: Scene, begin: float, seconds: float, seed: int) -> Tally:
     """Follow for a while, and judge every cycle."""
-    generator, tally, tracks = np.random.default_rng(seed), Tally(), None
+    generator, tally, tracks, whose = np.random.default_rng(seed), Tally(), None, Whose()
     for k in range(round(seconds / CYCLE)):
         stamp = begin + k * CYCLE
         sightings = scene.sightings(stamp, generator)
@@ -67,7 +69,8 @@ def watch(scene: Scene, begin: float, seconds: float, seed: int) -> Tally:
         tracks = follow(tracks, sightings, stamp, scene.settings)
         tracks.forecast(stamp + LAYERS)
         tally.count(tracks, sightings, time.perf_counter() - started)
-        tally.judge(tracks, sightings, scene)
+        whose.told(tracks, sightings, scene)
+        tally.judge(tracks, sightings, scene, whose)
     return tally
 
 
@@ -140,7 +143,11 @@ def accuracy(options: argparse.Namespace) -> None:
         print(row(f"`{name}`", total), flush=True)
     logs = options.log or sorted(find_data(LOGS, Path()).parent.glob("*.log.gz"))
     for path in logs:
-        print(row(f"log {path.name.split('.')[0]}", watch_log(path)), flush=True)
+        tally, name = watch_log(path), path.name.split(".")[0]
+        if len(tally.seconds) < FEWEST:
+            print(f"{path}: left out, its stamps hardly ever increase", file=sys.stderr)
+        else:
+            print(row(f"log {name}", tally), flush=True)
 
 
 def recorded_scenes(options: argparse.Namespace) -> tuple[list[Scene], list[np.ndarray]]:
@@ -186,16 +193,19 @@ def calibration(options: argparse.Namespace) -> None:
     seconds = min(options.seconds, float(last.max()) - begin)
     asked = []
     for scene in scenes:
-        tracks, settings = None, scene.settings
+        tracks, settings, whose = None, scene.settings, Whose()
         for k in range(round(seconds / CYCLE)):
             stamp = round(begin + k * CYCLE, 6)
-            tracks = follow(tracks, scene.sightings(stamp, generator), stamp, settings)
+            sightings = scene.sightings(stamp, generator)
+            tracks = follow(tracks, sightings, stamp, settings)
+            whose.told(tracks, sightings, scene)
             if k % EVERY or not len(tracks):
                 continue
-            mine = matches(tracks, scene.world, settings)
+            mine = whose.all(tracks)
             movers = scene.world.movers
             # extensions beyond the recording are straight: they would flatter
-            known = (mine >= 0) & (first[mine] <= stamp) & (stamp + AHEAD[:, None] <= last[mine])
+            known = (mine[:, 0] >= 0) & (first[mine] <= stamp).all(axis=1)
+            known = known & (stamp + AHEAD[:, None] <= last[mine].min(axis=1))
             asked += promises(
                 tracks.forecast(stamp + AHEAD),
                 movers.positions(stamp + AHEAD)[:, mine],

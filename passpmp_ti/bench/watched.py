@@ -6,7 +6,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
 
 from passpmp_ti.bench.reliability import touch_chance
 from passpmp_ti.grid.static_map import StaticMap
@@ -17,11 +16,12 @@ from passpmp_ti.settings import Settings
 from passpmp_ti.sim.lidar import Lidar
 from passpmp_ti.sim.world import World
 from passpmp_ti.tracking import Forecast, Sighting, Tracks
+from passpmp_ti.tracking.ledger import COAST
 
 GROWN_UP = 1.0
 """Velocities of younger tracks are not judged [s]."""
-CLOSE = 3.0
-"""A track farther than this from a mover's centre is not taken for it [object widths]."""
+SURFACE = 0.02
+"""A return farther outside of a mover than this is not one of it [m]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -53,20 +53,45 @@ def sightings_of(
     ]
 
 
-def matches(tracks: Tracks, world: World, settings: Settings) -> np.ndarray:
-    """[N] the mover that each track is taken for, -1: none; at most one track a mover."""
-    found = np.full(len(tracks), -1)
-    present = np.flatnonzero(world.movers.present(tracks.stamp))
-    if not len(tracks) or not len(present):
-        return found
-    truth = world.movers.at(tracks.stamp)[present]
-    apart = np.hypot(*np.moveaxis(tracks.positions[:, None] - truth[None], -1, 0))
-    near = apart <= CLOSE * settings.object_width
-    # those that are not seen come last: a ghost takes no mover from its own track
-    rows, columns = linear_sum_assignment(np.where(near, apart + ~tracks.seen[:, None] * 10, 1e6))
-    good = near[rows, columns]
-    found[rows[good]] = present[columns[good]]
-    return found
+@dataclass
+class Whose:
+    """Which movers each track is about: those whose returns it was last given."""
+
+    known: dict[int, tuple[int, ...]] = field(default_factory=dict)
+    """Per id, the movers, that of the most returns first; none: something that stays."""
+
+    def told(self, tracks: Tracks, sightings: list[Sighting], scene: Scene) -> None:
+        """Take a cycle's returns into account."""
+        movers = scene.world.movers
+        present = np.flatnonzero(movers.present(tracks.stamp))
+        centre, radius = movers.at(tracks.stamp)[present], movers.radius[present]
+        owner = np.concatenate([own[own >= 0] for own in tracks.owner])
+        points = np.concatenate(
+            [_points(s, own >= 0) for s, own in zip(sightings, tracks.owner, strict=True)]
+        )
+        outside = np.hypot(*np.moveaxis(points[:, None] - centre[None], -1, 0)) - radius
+        for id_ in np.unique(owner):
+            hits = (outside[owner == id_] <= scene.settings.range_noise + SURFACE).sum(axis=0)
+            order = np.argsort(-hits, kind="stable")
+            self.known[int(id_)] = tuple(present[order[hits[order] > 0]].tolist())
+
+    def chief(self, tracks: Tracks) -> np.ndarray:
+        """[N] the mover of the most returns; -1: none."""
+        found = [self.known.get(int(id_), ()) for id_ in tracks.ids]
+        return np.array([movers[0] if movers else -1 for movers in found], dtype=int)
+
+    def all(self, tracks: Tracks) -> np.ndarray:
+        """[N, M] all movers of each track; rows are filled up with its first; -1: none."""
+        found = [self.known.get(int(id_), ()) or (-1,) for id_ in tracks.ids]
+        most = max((len(movers) for movers in found), default=1)
+        return np.array([m + m[:1] * (most - len(m)) for m in found], dtype=int).reshape(-1, most)
+
+
+def _points(sighting: Sighting, beams: np.ndarray) -> np.ndarray:
+    """[p, 2] where the returns of some beams lie [m]."""
+    bearing, r = sighting.bearings[beams], sighting.ranges[beams]
+    way = np.stack([np.cos(bearing), np.sin(bearing)], axis=1)
+    return np.array(sighting.origin) + r[:, None] * way
 
 
 @dataclass
@@ -82,7 +107,8 @@ class Tally:
     explained: int = 0
     seconds: list[float] = field(default_factory=list)
     tracks: list[int] = field(default_factory=list)
-    _known: dict[int, int] = field(default_factory=dict)
+    _known: dict[int, tuple[int, float]] = field(default_factory=dict)
+    """Per mover: the id of its track, and when it was last met [s]."""
 
     def count(self, tracks: Tracks, sightings: list[Sighting], seconds: float) -> None:
         """Take a cycle down; no truth is needed."""
@@ -99,10 +125,10 @@ class Tally:
         for name in ("movers_seen", "movers_followed", "switches", "returns", "explained"):
             setattr(self, name, getattr(self, name) + getattr(other, name))
 
-    def judge(self, tracks: Tracks, sightings: list[Sighting], scene: Scene) -> None:
-        """Compare a cycle with the truth."""
+    def judge(self, tracks: Tracks, sightings: list[Sighting], scene: Scene, whose: Whose) -> None:
+        """Compare a cycle with the truth; `whose` knows of it."""
         movers, stamp = scene.world.movers, tracks.stamp
-        mine = matches(tracks, scene.world, scene.settings)
+        mine = whose.chief(tracks)
         own = np.flatnonzero((mine >= 0) & tracks.seen)
         truth = movers.positions(np.array([stamp - 0.05, stamp]))
         velocity = (truth[1] - truth[0]) / 0.05
@@ -110,21 +136,20 @@ class Tally:
         old = own[tracks.age[own] >= GROWN_UP]
         self.speed.append(np.hypot(*(tracks.velocities[old] - velocity[mine[old]]).T))
         for n in own:
-            known = self._known.get(int(mine[n]))
-            self.switches += known is not None and known != int(tracks.ids[n])
-            self._known[int(mine[n])] = int(tracks.ids[n])
-        seen = _in_view(sightings, truth[1], movers.radius + scene.settings.range_noise + 0.02)
+            known, met = self._known.get(int(mine[n]), (-1, -np.inf))
+            # who was away for longer than a track coasts comes back as somebody else
+            self.switches += stamp - met <= COAST and known != int(tracks.ids[n])
+            self._known[int(mine[n])] = int(tracks.ids[n]), stamp
+        seen = _in_view(sightings, truth[1], movers.radius + scene.settings.range_noise + SURFACE)
         self.movers_seen += int(seen.sum())
-        self.movers_followed += int(seen[mine[own]].sum())
+        self.movers_followed += int(seen[np.unique(mine[own])].sum())
 
 
 def _in_view(sightings: list[Sighting], centre: np.ndarray, radius: np.ndarray) -> np.ndarray:
     """[M] bool: movers with three returns or more."""
     count = np.zeros(len(centre), dtype=int)
     for s in sightings:
-        bearing, r = s.bearings[s.movable], s.ranges[s.movable]
-        points = np.array(s.origin) + r[:, None] * np.stack([np.cos(bearing), np.sin(bearing)], 1)
-        apart = np.hypot(*np.moveaxis(points[:, None] - centre[None], -1, 0))
+        apart = np.hypot(*np.moveaxis(_points(s, s.movable)[:, None] - centre[None], -1, 0))
         count += (apart <= radius).sum(axis=0)
     return count >= 3
 
@@ -160,9 +185,9 @@ def promises(
 
     Args:
         forecast: of N tracks at L times.
-        truth: [L, N, 2] where each track's mover was then [m].
+        truth: [L, N, M, 2] where the movers of each track were then [m].
         known: [L, N] bool: the truth is recorded.
-        radius: [N] of the movers [m].
+        radius: [N, M] of the movers [m].
         stamp: when the forecast was made [s].
         places: discs a track and time.
         generator: draws them.
@@ -182,6 +207,7 @@ def promises(
         chance = touch_chance(
             forecast.weight[n], mean[n], covariance[n], place, disc + forecast.radius[n]
         )
-        touched = np.hypot(*(truth[step, n] - place).T) < disc + radius[n]
+        apart = np.hypot(*np.moveaxis(truth[step, n] - place[:, None], -1, 0))
+        touched = (apart < disc[:, None] + radius[n]).any(axis=1)
         ahead = np.full(len(n), time - stamp)
         yield Promises(ahead, chance, touched, int(known[step].sum()))
