@@ -1,0 +1,97 @@
+"""Input space sampling (ISS): a fan of motions, of which the free one nearest to the goal is taken.
+
+Sec. 5.1.5, after Howard, Green, Kelly & Ferguson, "State space sampling of feasible motions for
+high-performance mobile robot navigation in complex environments", J. Field Robotics 25, 2008.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from passpmp_ti import device
+from passpmp_ti.grid.static_map import StaticMap
+from passpmp_ti.kernels.rollouts import LAST, STEPS, roll_out
+from passpmp_ti.planner.baselines.cycle import Reactive, Sight
+from passpmp_ti.planner.baselines.motion import Motion
+from passpmp_ti.planner.baselines.obstacles import Obstacles
+from passpmp_ti.robots import Robot
+from passpmp_ti.settings import Settings
+from passpmp_ti.trajectory import Trajectory
+
+MOTIONS = 11
+"""Sec. 5.1.5."""
+
+
+class InputSpaceSampling(Reactive):
+    """ISS: 11 constant inputs, spread evenly from the sharpest turn right to the sharpest left.
+
+    Each is followed by the robot's own dynamics over the navigator's horizon (the cycle and the
+    primitives). Those along which the robot meets a return of the latest scan are dropped; nothing
+    is said of what moves, nor of what comes after. Of the others the one that ends nearest to the
+    goal is taken; where there is none the robot brakes. All are driven at one speed: the top speed,
+    or less where the horizon would reach beyond the goal.
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        settings: Settings,
+        goal: tuple[float, float] | Sequence[tuple[float, float]],
+        static_map: StaticMap | None = None,
+        *,
+        seed: int | np.random.Generator = 0,
+    ) -> None:
+        """See `Navigator`; nothing is random."""
+        super().__init__(Fan(robot, settings).plan, robot, settings, goal, static_map)
+
+
+class Fan:
+    """The motions that are tried, and the choice among them."""
+
+    def __init__(self, robot: Robot, settings: Settings) -> None:
+        self._motion = Motion(robot, settings)
+        self._steps = sum(settings.levels)
+        self._horizon = self._steps * settings.time_step
+        self._turns = np.linspace(-1.0, 1.0, MOTIONS)
+
+    def plan(self, sight: Sight) -> Trajectory | None:
+        """The free motion that ends nearest to the goal, ties to the right; None: none is free."""
+        motion = self._motion
+        robot, settings = motion.robot, motion.settings
+        here = (float(sight.root[0]), float(sight.root[1]))
+        away = math.dist(here, sight.goal)
+        speed = min(robot.top_speed, away / self._horizon)
+        targets = motion.inputs(np.full(MOTIONS, speed), self._turns)
+        reach = robot.top_speed * self._horizon + robot.radius
+        obstacles = Obstacles.seen(sight.scans, here, reach, settings.cell)
+        found = rolled_out(motion, obstacles, sight, targets[:, None], self._steps)
+        free = found[:, STEPS] >= self._steps
+        if not free.any():
+            return None
+        best = int(np.argmin(np.where(free, found[:, LAST], np.inf)))
+        return motion.towards(sight.root, sight.start, targets[best : best + 1], self._steps)
+
+
+def rolled_out(
+    motion: Motion, obstacles: Obstacles, sight: Sight, targets: np.ndarray, steps: int
+) -> np.ndarray:
+    """Try motions [N, T, 2] of T stages of `steps` time steps each, from the sight's root.
+
+    Returns:
+        [N, 4] float64, see `kernels.rollouts.roll_out`.
+    """
+    from passpmp_ti.grid.body import to_poses
+
+    count, stages, _ = targets.shape
+    found = device.empty((count, 4), np.float32)
+    rows = np.ascontiguousarray(targets.reshape(-1, 2), dtype=np.float32)
+    roll_out(
+        motion.robot.kind, device.share(), device.put(motion.numbers), obstacles.gaps,
+        obstacles.frame, device.put(to_poses(sight.root[None], obstacles.centre)),
+        device.put(rows), stages, steps, sight.goal[0] - obstacles.centre[0],
+        sight.goal[1] - obstacles.centre[1], found,
+    )  # fmt: skip
+    return device.host(found).astype(np.float64)
