@@ -54,7 +54,7 @@ def pose_in(table: ti.template(), row):
 
 @ti.func
 def gap_at(q: pose7, gaps: ti.template(), frame: ti.template(), numbers: ti.template()):
-    """Distance between the robot's body and the nearest return [m]; below 0 where they may touch."""
+    """Distance from the robot's body to the nearest return [m]; below 0 where they may touch."""
     least = OPEN
     for d in range(DISCS, numbers.shape[0]):
         x = q[X] + numbers[d] * q[C]
@@ -138,8 +138,7 @@ def drive(
     path: Table,  # [T * steps + 1, 7]
 ):
     """The poses of one motion, the start first."""
-    ti.loop_config(serialize=True)
-    for once in range(1):
+    for _ in range(1):  # the steps below follow one another
         robot = robot_in(numbers)
         q = pose_in(start, 0)
         for row in range(path.shape[0]):

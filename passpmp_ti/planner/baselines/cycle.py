@@ -46,7 +46,7 @@ class Reactive:
     """Drives a robot by a policy, behind the navigator's door and on its timeline.
 
     Nothing that it answers is verified, but all of it ends at rest. It brakes by itself where that
-    ends at the goal, and where the policy finds nothing.
+    ends at the goal, unless `stops` is false, and where the policy finds nothing.
 
     Args:
         policy: makes each cycle's plan.
@@ -62,6 +62,8 @@ class Reactive:
         settings: Settings,
         goal: tuple[float, float] | Sequence[tuple[float, float]],
         static_map: StaticMap | None = None,
+        *,
+        stops: bool = True,
     ) -> None:
         backend.init()
         owner = type(self).__name__
@@ -77,6 +79,7 @@ class Reactive:
         """The trajectory that is being executed, or will be from its start."""
         self.record = CycleRecord(stamp=-math.inf, decision="held", reason="no cycle yet")
         self._policy = policy
+        self._stops = stops
         self._motion = Motion(robot, settings)
         self._allowed = allowed_gap(robot, settings)
         self._next_goal = 0
@@ -134,14 +137,15 @@ class Reactive:
             return replace(record, decision="arrived", chosen=standing_still)
         stopping = self._motion.braking(root, start)
         near = STOP_SHARE * self.settings.goal_tolerance
-        if math.dist(stopping.states[-1, :2], self.goal) <= near:
+        if self._stops and math.dist(stopping.states[-1, :2], self.goal) <= near:
             return replace(record, decision="new", chosen=stopping, plan_time=stopping.duration)
         plan = self._policy(Sight(scans, root, start, self.goal))
         if plan is None:
             return replace(
                 record, reason="no motion is free", chosen=stopping, plan_time=stopping.duration
             )
-        return replace(record, decision="new", chosen=plan, plan_time=plan.duration)
+        decision = "held" if plan is self.held else "new"
+        return replace(record, decision=decision, chosen=plan, plan_time=max(plan.end - start, 0.0))
 
     def _arrive(self, state: np.ndarray, root: np.ndarray) -> bool:
         """At rest at a goal: go on to the next one, or stay for good at the last."""

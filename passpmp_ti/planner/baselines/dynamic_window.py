@@ -89,8 +89,8 @@ class Window:
         """[SIDE^2, 2] inputs that can be reached within the interval from those of now [2]."""
         low, high = self._motion.limits()
         span = np.array(self._motion.rates) * INTERVAL
-        first = np.linspace(*np.clip([now[0] - span[0], now[0] + span[0]], low[0], high[0]), SIDE)
-        second = np.linspace(*np.clip([now[1] - span[1], now[1] + span[1]], low[1], high[1]), SIDE)
+        least, most = np.clip(now - span, low, high), np.clip(now + span, low, high)
+        first, second = np.linspace(least, most, SIDE).T
         return np.stack(np.meshgrid(first, second, indexing="ij"), axis=-1).reshape(-1, 2)
 
     def _arcs(self, sight: Sight, inputs: np.ndarray) -> np.ndarray:
@@ -131,4 +131,5 @@ def smoothed(score: np.ndarray) -> np.ndarray:
     """[n, n] mean of each value and its eight neighbours; the border stands for what is beyond."""
     wide = np.pad(score, 1, mode="edge")
     n, m = score.shape
-    return sum(wide[r : r + n, c : c + m] for r in range(3) for c in range(3)) / 9
+    shifted = [wide[r : r + n, c : c + m] for r in range(3) for c in range(3)]
+    return np.mean(shifted, axis=0)

@@ -11,7 +11,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from passpmp_ti import device
+from passpmp_ti import device, door
+from passpmp_ti.grid.body import to_poses
 from passpmp_ti.grid.static_map import StaticMap
 from passpmp_ti.kernels.rollouts import LAST, STEPS, roll_out
 from passpmp_ti.planner.baselines.cycle import Reactive, Sight
@@ -23,16 +24,22 @@ from passpmp_ti.trajectory import Trajectory
 
 MOTIONS = 11
 """Sec. 5.1.5."""
+HORIZON = 2.0
+"""[s]"""
 
 
 class InputSpaceSampling(Reactive):
     """ISS: 11 constant inputs, spread evenly from the sharpest turn right to the sharpest left.
 
-    Each is followed by the robot's own dynamics over the navigator's horizon (the cycle and the
-    primitives). Those along which the robot meets a return of the latest scan are dropped; nothing
-    is said of what moves, nor of what comes after. Of the others the one that ends nearest to the
-    goal is taken; where there is none the robot brakes. All are driven at one speed: the top speed,
-    or less where the horizon would reach beyond the goal.
+    Each is followed by the robot's own dynamics over a horizon. Those along which the robot meets a
+    return of the latest scan are dropped; nothing is said of what moves, nor of what comes after.
+    Of the others the one that ends nearest to the goal is taken; where there is none the robot
+    brakes. All are driven at one speed: the top speed, or less where the horizon would reach beyond
+    the goal.
+
+    Args:
+        horizon: how far ahead [s]. The paper gives none: with 2 s the robot does what Figs. 15 and
+            17 show.
     """
 
     def __init__(
@@ -43,17 +50,19 @@ class InputSpaceSampling(Reactive):
         static_map: StaticMap | None = None,
         *,
         seed: int | np.random.Generator = 0,
+        horizon: float = HORIZON,
     ) -> None:
         """See `Navigator`; nothing is random."""
-        super().__init__(Fan(robot, settings).plan, robot, settings, goal, static_map)
+        door.finite("InputSpaceSampling", "horizon", horizon, least=settings.time_step, unit="s")
+        super().__init__(Fan(robot, settings, horizon).plan, robot, settings, goal, static_map)
 
 
 class Fan:
     """The motions that are tried, and the choice among them."""
 
-    def __init__(self, robot: Robot, settings: Settings) -> None:
+    def __init__(self, robot: Robot, settings: Settings, horizon: float) -> None:
         self._motion = Motion(robot, settings)
-        self._steps = sum(settings.levels)
+        self._steps = settings.steps_of(horizon)
         self._horizon = self._steps * settings.time_step
         self._turns = np.linspace(-1.0, 1.0, MOTIONS)
 
@@ -83,8 +92,6 @@ def rolled_out(
     Returns:
         [N, 4] float64, see `kernels.rollouts.roll_out`.
     """
-    from passpmp_ti.grid.body import to_poses
-
     count, stages, _ = targets.shape
     found = device.empty((count, 4), np.float32)
     rows = np.ascontiguousarray(targets.reshape(-1, 2), dtype=np.float32)

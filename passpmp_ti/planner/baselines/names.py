@@ -10,6 +10,7 @@ from passpmp_ti.planner.baselines.dynamic_window import DynamicWindow
 from passpmp_ti.planner.baselines.input_space import InputSpaceSampling
 from passpmp_ti.planner.baselines.mppi import Mppi
 from passpmp_ti.planner.baselines.passpmp import Passpmp
+from passpmp_ti.planner.baselines.viability import Viability
 from passpmp_ti.planner.navigator import Navigator
 
 BASELINES: dict[str, Callable[..., Any]] = {
@@ -17,6 +18,7 @@ BASELINES: dict[str, Callable[..., Any]] = {
     "iss": InputSpaceSampling,
     "dwa": DynamicWindow,
     "mppi": Mppi,
+    "viability": Viability,
 }
 NAVIGATOR = "passpmp-pso"
 
