@@ -22,7 +22,7 @@ BEGIN, END = "<!-- benchmarks/baselines.py -->\n", "<!-- end -->\n"
 
 
 def drive(job: tuple[str, str, int, float | None]) -> dict:
-    """One episode: (scenario, planner, seed, its longest [s]) -> summary; why, where none can be."""
+    """One episode: (scenario, planner, seed, its longest [s]) -> summary, or why none can be."""
     from dataclasses import replace
 
     import passpmp_ti as pti
@@ -45,8 +45,8 @@ def drive(job: tuple[str, str, int, float | None]) -> dict:
 def table(rows: list[dict]) -> str:
     """Markdown, a line for each scenario and planner."""
     lines = [
-        "| scenario | planner | goals | contacts while moving | at rest | time to goal, median [s] |"
-        " metres driven | cycle, median [ms] |",
+        "| scenario | planner | goals | contacts while moving | at rest"
+        " | time to goal, median [s] | metres driven | cycle, median [ms] |",
         "|---|---|---|---|---|---|---|---|",
     ]
     groups: dict[tuple[str, str], list[dict]] = {}

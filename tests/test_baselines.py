@@ -148,6 +148,15 @@ def test_a_robot_that_is_not_on_its_plan_brakes_where_it_is():
     assert np.array_equal(answer.states[0], moved)
 
 
+def test_an_answer_that_was_not_taken_is_planned_on_from_what_is_followed_instead():
+    planner = DynamicWindow(CHAIR, settings_for(CHAIR), goal=(5.0, 0.0))
+    planner.update(scan_of([]), np.zeros(5))
+    standing = pti.Trajectory.resting(np.zeros(5), 0.0)
+    answer = planner.update(scan_of([], 0.1), np.zeros(5), following=standing)
+    assert planner.record.decision == "new"
+    assert np.array_equal(answer.states[0], np.zeros(5))
+
+
 def test_goals_are_reached_in_turn_at_rest():
     goals = [(0.8, 0.0), (1.6, 0.0)]
     planner = DynamicWindow(CHAIR, settings_for(CHAIR), goal=goals)

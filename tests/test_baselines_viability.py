@@ -157,8 +157,8 @@ def test_what_is_not_known_for_ever_is_refused():
         KnownWorld(bounds=(0, 0, 1, 1), clearance=far, movers=NoMovers())
     with pytest.raises(ValueError, match="must divide it"):
         Viability(CHAIR, SETTINGS, goal=(1.0, 0.0), world=replace(a_patrol(), period=7.77))
+    huge = replace(a_patrol(), bounds=(-4000, -4000, 4000, 4000))
     with pytest.raises(ValueError, match="too many to work out"):
-        huge = replace(a_patrol(), bounds=(-4000, -4000, 4000, 4000))
         ViabilityKernel.computed(lattice_of(period=8.0), huge, begin=0.0)
 
 

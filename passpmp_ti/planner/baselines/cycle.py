@@ -94,7 +94,13 @@ class Reactive:
         """Whether the robot came to rest at the last goal."""
         return self._next_goal >= len(self.goals)
 
-    def update(self, scan: Scan | Sequence[Scan], state: np.ndarray) -> Trajectory:
+    def update(
+        self,
+        scan: Scan | Sequence[Scan],
+        state: np.ndarray,
+        *,
+        following: Trajectory | None = None,
+    ) -> Trajectory:
         """Plan one cycle; see `Navigator.update`.
 
         Raises:
@@ -104,6 +110,8 @@ class Reactive:
         began = time.perf_counter()
         if self.held is None:
             self.held = standing(scan, state, self.robot)
+        if following is not None:
+            self.held = following
         scans, trouble = scans_in(scan)
         if trouble:
             # the robot goes on to rest on what it holds
