@@ -10,7 +10,7 @@ from passpmp_ti import device
 from passpmp_ti.cli import BAD_INPUT, main
 from passpmp_ti.planner.baselines.cycle import Sight
 from passpmp_ti.planner.baselines.dynamic_window import DynamicWindow, smoothed
-from passpmp_ti.planner.baselines.input_space import Fan, InputSpaceSampling, rolled_out
+from passpmp_ti.planner.baselines.input_space import Fan, InputSpaceSampling
 from passpmp_ti.planner.baselines.motion import Motion
 from passpmp_ti.planner.baselines.mppi import Mppi
 from passpmp_ti.planner.baselines.names import BASELINES, baseline
@@ -173,7 +173,8 @@ def test_motions_are_told_when_they_touch_and_where_they_end():
     sight = sight_of(scan_of(wall(2.0, -3, 3)), speed=1.0)
     obstacles = Obstacles.seen(sight.scans, (0.0, 0.0), 5.0, settings.cell)
     straight, spin = [[1.0, 1.0]], [[-1.0, 1.0]]
-    found = rolled_out(motion, obstacles, sight, np.array([straight, spin]), 200)
+    targets = np.array([straight, spin])
+    found = obstacles.tried(motion, sight.root, sight.goal, targets, 200)
     mean, last, free, gap = found[0]
     # at 1 m/s towards a goal 5 m away, past the wall: from 5 to 3 m in 2 s
     assert (mean, last) == pytest.approx((4.0, 3.0), abs=0.01)

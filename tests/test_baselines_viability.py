@@ -8,11 +8,11 @@ import pytest
 
 import passpmp_ti as pti
 from passpmp_ti import device
-from passpmp_ti.planner.baselines.kernel import ViabilityKernel, half_move
 from passpmp_ti.planner.baselines.known import KnownWorld
 from passpmp_ti.planner.baselines.lattice import HEADINGS, LEVELS, STANDING, Lattice
 from passpmp_ti.planner.baselines.motion import Motion
 from passpmp_ti.planner.baselines.viability import Viability
+from passpmp_ti.planner.baselines.viability_kernel import ViabilityKernel, half_move
 from passpmp_ti.sim.movers import NoMovers, PathMovers
 from passpmp_ti.sim.patrol import PatrolMovers, PatrolSource
 from passpmp_ti.sim.planners import known_world, planner_for

@@ -11,10 +11,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from passpmp_ti import device, door
-from passpmp_ti.grid.body import to_poses
+from passpmp_ti import door
 from passpmp_ti.grid.static_map import StaticMap
-from passpmp_ti.kernels.rollouts import LAST, STEPS, roll_out
+from passpmp_ti.kernels.rollouts import LAST, STEPS
 from passpmp_ti.planner.baselines.cycle import Reactive, Sight
 from passpmp_ti.planner.baselines.motion import Motion
 from passpmp_ti.planner.baselines.obstacles import Obstacles
@@ -76,29 +75,9 @@ class Fan:
         targets = motion.inputs(np.full(MOTIONS, speed), self._turns)
         reach = robot.top_speed * self._horizon + robot.radius
         obstacles = Obstacles.seen(sight.scans, here, reach, settings.cell)
-        found = rolled_out(motion, obstacles, sight, targets[:, None], self._steps)
+        found = obstacles.tried(motion, sight.root, sight.goal, targets[:, None], self._steps)
         free = found[:, STEPS] >= self._steps
         if not free.any():
             return None
         best = int(np.argmin(np.where(free, found[:, LAST], np.inf)))
         return motion.towards(sight.root, sight.start, targets[best : best + 1], self._steps)
-
-
-def rolled_out(
-    motion: Motion, obstacles: Obstacles, sight: Sight, targets: np.ndarray, steps: int
-) -> np.ndarray:
-    """Try motions [N, T, 2] of T stages of `steps` time steps each, from the sight's root.
-
-    Returns:
-        [N, 4] float64, see `kernels.rollouts.roll_out`.
-    """
-    count, stages, _ = targets.shape
-    found = device.empty((count, 4), np.float32)
-    rows = np.ascontiguousarray(targets.reshape(-1, 2), dtype=np.float32)
-    roll_out(
-        motion.robot.kind, device.share(), device.put(motion.numbers), obstacles.gaps,
-        obstacles.frame, device.put(to_poses(sight.root[None], obstacles.centre)),
-        device.put(rows), stages, steps, sight.goal[0] - obstacles.centre[0],
-        sight.goal[1] - obstacles.centre[1], found,
-    )  # fmt: skip
-    return device.host(found).astype(np.float64)

@@ -68,7 +68,6 @@ class Lattice:
         times [m]."""
         self.ends = np.stack([path[1] for path in paths])
         """[U, 3] pose after each move."""
-        self.turns = float(np.abs(self.ends[:, 2]).max())
 
     def _moves(self, reverses: bool) -> list[Move]:
         found = []

@@ -19,7 +19,7 @@ ROUNDING = 2**0.5
 class Motion:
     """A robot's motion model, at the settings' time step.
 
-    Places are counted from `anchor`: kernels compute in single precision.
+    Kernels compute in single precision: they are given places as seen from where a motion begins.
     """
 
     def __init__(self, robot: Robot, settings: Settings) -> None:

@@ -15,7 +15,6 @@ import numpy as np
 from passpmp_ti.grid.static_map import StaticMap
 from passpmp_ti.kernels.rollouts import GAP, MEAN, STEPS
 from passpmp_ti.planner.baselines.cycle import Reactive, Sight
-from passpmp_ti.planner.baselines.input_space import rolled_out
 from passpmp_ti.planner.baselines.motion import Motion
 from passpmp_ti.planner.baselines.obstacles import Obstacles
 from passpmp_ti.robots import CAR, Robot
@@ -91,7 +90,7 @@ class Sampler:
         here = (float(sight.root[0]), float(sight.root[1]))
         way = robot.top_speed * self._stages * settings.cycle
         obstacles = Obstacles.seen(sight.scans, here, way + robot.radius, settings.cell)
-        found = rolled_out(motion, obstacles, sight, self._inputs(tried), steps)
+        found = obstacles.tried(motion, sight.root, sight.goal, self._inputs(tried), steps)
         touches = found[:, STEPS] < self._stages * steps
         if touches.all():
             self._mean[:] = 0.0

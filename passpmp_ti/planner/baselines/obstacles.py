@@ -9,7 +9,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from passpmp_ti import device
+from passpmp_ti.grid.body import to_poses
 from passpmp_ti.grid.distance import distance_to_zeros
+from passpmp_ti.kernels.rollouts import roll_out
+from passpmp_ti.planner.baselines.motion import Motion
 from passpmp_ti.scan import Scan
 
 
@@ -45,3 +48,33 @@ class Obstacles:
         gaps = distance_to_zeros(free) * np.float32(cell)
         frame = np.array([-half * cell, -half * cell, 1 / cell], dtype=np.float32)
         return cls(device.put(gaps), device.put(frame), centre)
+
+    def tried(
+        self,
+        motion: Motion,
+        root: np.ndarray,
+        goal: tuple[float, float],
+        targets: np.ndarray,
+        steps: int,
+    ) -> np.ndarray:
+        """How motions fare among the obstacles.
+
+        Args:
+            motion: of the robot.
+            root: [5] the state that all begin at.
+            goal: (x, y) [m].
+            targets: [N, T, 2] inputs that each steers to in turn.
+            steps: time steps of each of the T stages.
+
+        Returns:
+            [N, 4] float64, see `kernels.rollouts.roll_out`.
+        """
+        count, stages, _ = targets.shape
+        found = device.empty((count, 4), np.float32)
+        rows = np.ascontiguousarray(targets.reshape(-1, 2), dtype=np.float32)
+        roll_out(
+            motion.robot.kind, device.share(), device.put(motion.numbers), self.gaps, self.frame,
+            device.put(to_poses(root[None], self.centre)), device.put(rows), stages, steps,
+            goal[0] - self.centre[0], goal[1] - self.centre[1], found,
+        )  # fmt: skip
+        return device.host(found).astype(np.float64)

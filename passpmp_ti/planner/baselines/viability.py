@@ -12,10 +12,10 @@ import numpy as np
 
 from passpmp_ti.grid.static_map import StaticMap
 from passpmp_ti.planner.baselines.cycle import Reactive, Sight
-from passpmp_ti.planner.baselines.kernel import ViabilityKernel, half_move
 from passpmp_ti.planner.baselines.known import KnownWorld
 from passpmp_ti.planner.baselines.lattice import LEVELS, STANDING, Lattice
 from passpmp_ti.planner.baselines.motion import Motion
+from passpmp_ti.planner.baselines.viability_kernel import ViabilityKernel, half_move
 from passpmp_ti.robots import Robot
 from passpmp_ti.settings import Settings
 from passpmp_ti.trajectory import Trajectory
