@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 
 FAILED, BAD_INPUT, INTERRUPTED = 1, 2, 130
 """Exit codes."""
+CERTIFIED = ("passpmp-pso", "passpmp")
+"""Planners whose cycles can be certified."""
 
 # Heavy imports stand inside the subcommands: `passpmp --help` answers at once.
 
@@ -43,6 +45,11 @@ def _run(given: argparse.Namespace) -> int:
 
     scenario = _scenario(given)
     seeds = given.seeds or [given.seed]
+    if given.certificates and given.planner not in CERTIFIED:
+        raise ValueError(
+            f"--certificates: {given.planner} proves nothing; leave it out, or take --planner"
+            f" {CERTIFIED[0]}"
+        )
     for folder in filter(None, (given.out, given.certificates)):
         Path(folder).mkdir(parents=True, exist_ok=True)
     summaries: list[Mapping[str, Any]] = []
@@ -57,7 +64,8 @@ def _run(given: argparse.Namespace) -> int:
         if certificates is not None:
             watchers.append(_certifying(certificates, given.certify_every))
         try:
-            summaries.append(_drive(scenario, seed, watchers, out, not given.no_video))
+            video = not given.no_video
+            summaries.append(_drive(scenario, seed, watchers, out, video, given.planner))
         except KeyboardInterrupt:
             interrupted = True
         finally:
@@ -87,19 +95,23 @@ def _drive(
     watchers: Sequence[Callable[[Any], None]],
     out: Path | None,
     video: bool,
+    planner: str,
 ) -> Mapping[str, Any]:
     """One episode, watched; what was seen is written even if it is cut short."""
     from passpmp_ti.sim.episode import simulate
+    from passpmp_ti.sim.planners import planner_for
 
     _start()
+    made = planner_for(planner, scenario, seed)
     if out is None:
-        return simulate(scenario, seed=seed, on_cycle=_all(*watchers)).summary()
+        return simulate(scenario, seed=seed, on_cycle=_all(*watchers), planner=made).summary()
     from passpmp_ti.viz.outcome import Outcome
 
     settings = scenario.settings
     detail = f"seed {seed} · objects ≤ {settings.object_speed:.3g} m/s · cycle {settings.cycle:g} s"
     with Outcome(out, scenario.name, detail, video=video) as outcome:
-        episode = simulate(scenario, seed=seed, on_cycle=_all(*watchers, outcome.see))
+        watch = _all(*watchers, outcome.see)
+        episode = simulate(scenario, seed=seed, on_cycle=watch, planner=made)
         return outcome.finish(episode)
 
 
@@ -324,6 +336,12 @@ def _parser() -> argparse.ArgumentParser:
     run.add_argument("--seeds", type=_seeds, metavar="A-B", help="several seeds, one after another")
     run.add_argument("--out", metavar="DIR", help="leave video, snapshots, summary and arrays here")
     run.add_argument("--no-video", action="store_true", help="with --out: no video")
+    run.add_argument(
+        "--planner",
+        default="passpmp-pso",
+        metavar="NAME",
+        help="passpmp-pso (default), passpmp, iss, dwa, mppi or viability; see docs/baselines.md",
+    )
     run.add_argument(
         "--certificates", metavar="DIR", help="leave a certificate of each cycle here"
     )

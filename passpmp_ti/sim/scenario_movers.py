@@ -10,6 +10,7 @@ import numpy as np
 from passpmp_ti import door
 from passpmp_ti.sim.data_files import find_data
 from passpmp_ti.sim.document import Section
+from passpmp_ti.sim.patrol import PatrolSource
 from passpmp_ti.sim.recordings import FORMATS, Recording
 from passpmp_ti.sim.sources import (
     MoverSource,
@@ -25,7 +26,12 @@ def read_movers(root: Section) -> MoverSource:
     section = root.section("movers")
     if section is None:
         return NobodyMoves()
-    readers = {"spline": _splines, "scripted": _script, "recording": _recording}
+    readers = {
+        "spline": _splines,
+        "scripted": _script,
+        "patrol": _patrol,
+        "recording": _recording,
+    }
     kind = section.choice("type", readers)
     if kind not in readers:
         return NobodyMoves()
@@ -66,6 +72,17 @@ def _script(section: Section) -> MoverSource:
     if not paths or any(p is None for p in paths):
         return NobodyMoves()
     return ScriptSource(paths=tuple(paths), radius=tuple(radii))
+
+
+def _patrol(section: Section) -> MoverSource:
+    script = _script(section)
+    if not isinstance(script, ScriptSource):
+        return script
+    try:
+        return PatrolSource(paths=script.paths, radius=script.radius)
+    except ValueError as problem:
+        section.document.blame(section.line, problem)
+        return NobodyMoves()
 
 
 def _waypoints(disc: Section) -> Callable[[Any], tuple[tuple[float, float, float], ...]]:

@@ -1,0 +1,1 @@
+"""Other planners behind the navigator's door, to be compared with it."""
