@@ -9,7 +9,7 @@ import numpy as np
 
 from passpmp_ti.bench.reliability import touch_chance
 from passpmp_ti.grid.static_map import StaticMap
-from passpmp_ti.grid.view import views_of
+from passpmp_ti.grid.view import labels_of
 from passpmp_ti.kernels.beams import MOVABLE
 from passpmp_ti.scan import Scan
 from passpmp_ti.settings import Settings
@@ -46,10 +46,9 @@ def sightings_of(
 ) -> list[Sighting]:
     """Scans of one instant, without the returns that a label or the map explains."""
     anchor = scans[0].pose[:2]
-    views = views_of(scans, (), settings, anchor, [s.range_max for s in scans], static_map)
+    labels = labels_of(scans, settings, anchor, [s.range_max for s in scans], static_map)
     return [
-        Sighting.of(scan, views.met[v, : len(scan.ranges)] == MOVABLE)
-        for v, scan in enumerate(scans)
+        Sighting.of(scan, met == MOVABLE) for scan, met in zip(scans, labels.met, strict=True)
     ]
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import threading
+
 import numpy as np
 
 from passpmp_ti import device

@@ -153,8 +153,8 @@ class Laid:
     def tubes_over(
         self, hidden: device.Array, tubes: np.ndarray, strict: device.Array
     ) -> device.Array:
-        """[J, I] uint16: until when a place is free of hidden movers and of those in their tubes, or
-        of any whatever.
+        """[J, I] uint16: until when a place is free of hidden movers and of those in their tubes,
+        or of any whatever.
 
         Args:
             hidden: [J, I] uint16 arrival times of hidden movers at the bound of speed.

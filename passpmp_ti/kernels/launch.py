@@ -62,7 +62,8 @@ def kernel(function):
                 continue
             if not put(context, slot, value, wanted):
                 return slow(*args)
-            held[place] = weakref.ref(value) if wanted else _gone
+            # a launch leaves its own pointer where a device's array was handed over
+            held[place] = weakref.ref(value) if type(value) is np.ndarray else _gone
         prog.launch_kernel(compiled, context)
         result = None
         if not whole:

@@ -255,7 +255,8 @@ def grow_level(
                 end = block_begin(b + 1, blocks, first, last)
                 taken = 0
                 for parent in range(block_begin(b, blocks, first, last), end):
-                    taken += ti.abs(room_for(kind, pose, link, child_proof, parent, first, per_parent))
+                    found = room_for(kind, pose, link, child_proof, parent, first, per_parent)
+                    taken += ti.abs(found)
                 block[b] = taken
         ti.loop_config(serialize=True)
         for _ in range(1):
@@ -276,7 +277,8 @@ def grow_level(
                 parent = block_begin(b, blocks, first, last)
                 full = False
                 while not full:
-                    room = ti.abs(room_for(kind, pose, link, child_proof, parent, first, per_parent))
+                    found = room_for(kind, pose, link, child_proof, parent, first, per_parent)
+                    room = ti.abs(found)
                     if end + room > capacity:
                         full = True
                     else:
@@ -304,59 +306,93 @@ def grow_level(
                         for k in range(per_parent):
                             m = (parent - first) * per_parent + k
                             if child_proof[m] > 0:
-                                q = pose7(0.0)
-                                spent, there, after, at_rest_cost, seconds = 0.0, 0.0, 0.0, 0.0, 0.0
-                                if ti.static(by_roads):
-                                    road = gait[parent] * per_parent + k
-                                    start = pose_of(pose, parent)
-                                    q = road_end(rows, roads, road, steps, start)
-                                    spent, there = road_cost(
-                                        guide, ahead, guide_frame, numbers, roads, rows, road, steps,
-                                        SAMPLES, start, cost[parent, 1],
-                                    )  # fmt: skip
-                                    spent += cost[parent, 0]
-                                    gait[at] = roads[road, 4]
-                                    brake = number * per_parent + roads[road, 4] * counts[6]
-                                    brake += child_proof[m] - 1
-                                    seconds = roads[brake, 1] * numbers[1]
-                                    after, at_rest_cost = road_cost(
-                                        guide, ahead, guide_frame, numbers, roads, rows, brake,
-                                        roads[brake, 1], BRAKING_SAMPLES, q, there,
-                                    )  # fmt: skip
-                                else:
-                                    q = pose_of(child, m)
-                                    spent = child[m, 7]
-                                    there = child[m, 8]
-                                    after, at_rest_cost, seconds = braking_cost(
-                                        kind, guide, ahead, guide_frame, numbers, robot_of(numbers), q,
-                                        there, control_of(braking, child_proof[m] - 1),
-                                    )  # fmt: skip
-                                store_pose(pose, at, q)
-                                link[at, PARENT] = parent
-                                link[at, CONTROL] = k
-                                link[at, STEPS] = steps
-                                link[at, TICK] = link[parent, TICK] + steps * counts[4]
-                                link[at, PROOF] = child_proof[m] - 1
-                                link[at, FIRST] = -1
-                                link[at, CHILDREN] = 0
-                                link[at, WHAT] = GROWN
-                                cost[at, 0] = spent
-                                cost[at, 1] = there
-                                cost[at, 2] = after
-                                cost[at, 3] = at_rest_cost
-                                cost[at, 4] = seconds
-                                cost[at, 5] = 1.0
-                                if ti.static(part == PLACE):
-                                    risk[at, 0] = child[m, 9]
-                                    risk[at, 1] = child[m, 10]
-                                    cost[at, 5] = child[m, 11]
+                                store_child(
+                                    kind, by_roads, part, guide, ahead, guide_frame, numbers,
+                                    counts, braking, steps, number, roads, rows, pose, link, cost,
+                                    gait, risk, child, parent, k, m, child_proof[m] - 1, at,
+                                )  # fmt: skip
                                 at += 1
                     elif fits:
                         store_braking(
-                            kind, guide, ahead, guide_frame, numbers, counts, braking, parent, slot_now,
-                            pose, link, cost,
+                            kind, guide, ahead, guide_frame, numbers, counts, braking, parent,
+                            slot_now, pose, link, cost,
                         )  # fmt: skip
                     slot_now += room
+
+
+@ti.func
+def store_child(
+    kind: ti.template(),
+    by_roads: ti.template(),
+    part: ti.template(),
+    guide: ti.template(),
+    ahead: ti.template(),
+    guide_frame: ti.template(),
+    numbers: ti.template(),
+    counts: ti.template(),
+    braking: ti.template(),
+    steps,
+    number,
+    roads: ti.template(),
+    rows: ti.template(),
+    pose: ti.template(),
+    link: ti.template(),
+    cost: ti.template(),
+    gait: ti.template(),
+    risk: ti.template(),
+    child: ti.template(),
+    parent,
+    k,
+    m,
+    proof,
+    at,
+):
+    """Put a parent's k-th child, the m-th of the chunk, into slot `at`."""
+    q = pose7(0.0)
+    spent, there, after, at_rest_cost, seconds = 0.0, 0.0, 0.0, 0.0, 0.0
+    if ti.static(by_roads):
+        road = gait[parent] * counts[7] + k
+        start = pose_of(pose, parent)
+        q = road_end(rows, roads, road, steps, start)
+        spent, there = road_cost(
+            guide, ahead, guide_frame, numbers, roads, rows, road, steps, SAMPLES, start,
+            cost[parent, 1],
+        )  # fmt: skip
+        spent += cost[parent, 0]
+        gait[at] = roads[road, 4]
+        brake = number * counts[7] + roads[road, 4] * counts[6] + proof
+        seconds = roads[brake, 1] * numbers[1]
+        after, at_rest_cost = road_cost(
+            guide, ahead, guide_frame, numbers, roads, rows, brake, roads[brake, 1],
+            BRAKING_SAMPLES, q, there,
+        )  # fmt: skip
+    else:
+        q = pose_of(child, m)
+        spent = child[m, 7]
+        there = child[m, 8]
+        after, at_rest_cost, seconds = braking_cost(
+            kind, guide, ahead, guide_frame, numbers, robot_of(numbers), q, there,
+            control_of(braking, proof),
+        )  # fmt: skip
+    store_pose(pose, at, q)
+    link[at, PARENT] = parent
+    link[at, CONTROL] = k
+    link[at, STEPS] = steps
+    link[at, TICK] = link[parent, TICK] + steps * counts[4]
+    link[at, PROOF] = proof
+    link[at, FIRST] = -1
+    link[at, CHILDREN] = 0
+    link[at, WHAT] = GROWN
+    cost[at, 0] = spent
+    cost[at, 1] = there
+    cost[at, 2] = after
+    cost[at, 3] = at_rest_cost
+    cost[at, 4] = seconds
+    cost[at, 5] = 1.0
+    if ti.static(part == PLACE):
+        risk[at, 0] = child[m, 9]
+        risk[at, 1] = child[m, 10]
+        cost[at, 5] = child[m, 11]
 
 
 @ti.func

@@ -59,7 +59,7 @@ def weigh_children(
     child: Table,  # [M, 12]
     child_proof: Counts,  # [M]
 ):
-    """Refuse children whose plans are too risky; `child_proof` becomes the control that is allowed."""
+    """Refuse children whose plans are too risky; `child_proof` becomes the allowed control."""
     per_parent = counts[7]
     children = (last - first) * per_parent
     for index in range((children + GRAIN - 1) // GRAIN * share):
