@@ -118,14 +118,16 @@ def promised_and_met(kind, seed, movers, futures):
 
 
 def compared(seeds, movers, futures):
-    """[M, 4]: computed, met, and what independent steps and the worst step would say."""
+    """[M, 5]: computed, met, and what independent steps of 0.1 s and of 10 ms and the worst moment
+    would say."""
     rows = []
     for kind in MOTIONS:
         for seed in seeds:
             computed, met, moments = promised_and_met(kind, seed, movers, futures)
             noise = 3 * np.sqrt(max(met * (1 - met), 1 / futures) / futures)
             assert computed >= met - noise, (kind, seed)
-            rows.append([computed, met, 1 - np.prod(1 - moments[::10]), moments.max()])
+            steps = [1 - np.prod(1 - moments[::k]) for k in (10, 1)]
+            rows.append([computed, met, *steps, moments.max()])
     rows = np.array(rows)
     return rows[(rows[:, 1] >= 0.01) & (rows[:, 1] <= 0.9)]
 
@@ -138,15 +140,14 @@ def test_risk_bounds_the_frequency_of_drawn_futures_and_is_of_use():
 @pytest.mark.campaign
 @pytest.mark.parametrize("movers", [1, 3])
 def test_risk_bounds_the_frequency_of_many_drawn_futures(movers):
-    rows = compared(range(100, 150), movers=movers, futures=4000)
-    ratios = rows[:, [0, 2, 3]] / rows[:, 1:2]
-    print(f"{len(rows)} motions, {movers} movers: computed, independent steps, worst step / met")
+    rows = compared(range(100, 130), movers=movers, futures=3000)
+    ratios = rows[:, [0, 2, 3, 4]] / rows[:, 1:2]
+    print(f"{len(rows)} motions, {movers} movers: computed, 0.1 s, 10 ms, worst moment / met")
     for share in (0.1, 0.5, 0.9):
         print(share, np.round(np.quantile(ratios, share, axis=0), 2))
     assert np.median(ratios[:, 0]) <= 3.0
-    # the other two: counted again and again, or not at all
-    assert np.median(ratios[:, 1]) > 2.0
-    assert np.median(ratios[:, 2]) < 0.8
+    # the worst moment misses the others
+    assert np.median(ratios[:, 3]) < 0.8
 
 
 def braking_path(state, control):
