@@ -14,6 +14,7 @@ from oracle.forecasts import (
     gaussian,
     ring_flow,
 )
+from scipy.special import erf
 
 import passpmp_ti as pti
 from passpmp_ti import device
@@ -217,3 +218,9 @@ def test_bad_input_is_refused(changes, message):
         chances(forecast_of([mover], TIMES), **changes)
     with pytest.raises(ValueError, match="equally spaced"):
         chances(forecast_of([mover], TIMES[[0, 1, 3]]))
+
+
+def test_a_root_mean_square_with_two_over_pi_bounds_the_mean_size_of_a_normal_number():
+    mean = np.linspace(0, 12, 4001)
+    size = math.sqrt(2 / math.pi) * np.exp(-0.5 * mean**2) + mean * erf(mean / math.sqrt(2))
+    assert (size <= np.sqrt(mean**2 + 2 / math.pi) * (1 + 1e-12)).all()

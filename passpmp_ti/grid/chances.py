@@ -180,9 +180,7 @@ def chances_of(
         )
     span = sample_steps(settings) * settings.time_step
     radius = body_radius(robot, settings, span) + extra + forecast.radius
-    moments = moments_of(
-        forecast, radius, Reach.of(robot, position, stamp, speed, within), anchor
-    )
+    moments = moments_of(forecast, radius, Reach.of(robot, position, stamp, speed, within), anchor)
     objects, components = forecast.weight.shape
     clock = 16 + len(speeds)
     odds = np.zeros(clock + len(moments.times), dtype=np.float32)

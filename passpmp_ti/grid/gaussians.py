@@ -92,9 +92,7 @@ def between(
         pushed = s[:, None, None] * noise * grown[:, :, None] * grown[:, None, :]
         fits = np.linalg.eigvalsh(noise)[..., 0] >= -1e-9
         drifted = move @ start @ np.swapaxes(move, -1, -2) + pushed
-        covariance[:, :, inner] = np.where(
-            fits[..., None, None], drifted, covariance[:, :, inner]
-        )
+        covariance[:, :, inner] = np.where(fits[..., None, None], drifted, covariance[:, :, inner])
     return mean, covariance
 
 
@@ -114,9 +112,7 @@ def bends_of(
     """
     strongest = np.zeros(1)
     ends = slice(None, -1), slice(1, None)
-    rate = tuple(
-        np.diff(getattr(shape, name), axis=-1) / length for name in ("xx", "yy", "xy")
-    )
+    rate = tuple(np.diff(getattr(shape, name), axis=-1) / length for name in ("xx", "yy", "xy"))
     step = np.diff(mean[..., :2], axis=-2)
     for end in ends:
         at = shape.moments(end)

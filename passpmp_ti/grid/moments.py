@@ -279,7 +279,6 @@ def _rows(
     rows[..., 16] = 2 / math.pi * np.maximum(xx - kxx * px - kxy * py, 0.0)
     rows[..., 17] = 2 / math.pi * (xy - kxx * qx - kxy * qy)
     rows[..., 18] = 2 / math.pi * np.maximum(yy - kyx * qx - kyy * qy, 0.0)
-    rows[..., 19] = 0.5 / shape.least
     return rows
 
 

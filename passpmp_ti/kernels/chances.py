@@ -19,7 +19,7 @@ Shared parameters:
         6, 7 farther than this along an axis there is nothing [m], 8, 9 mean velocity [m/s],
         10-13 K = P_vx P_xx^-1 [1/s], 14 the part of K that is alike in all directions, times R,
         15 the rest of it, times R [m/s], 16-18 (2 / pi) Cv (xx, xy, yy) [m^2/s^2],
-        19 half the inverse of the least standard deviation [1/m], 20 weight, with the margin for
+        19 unused, 20 weight, with the margin for
         what lies between moments, 21 margin for what lies between a layer's nodes
     places i32 [J * N * C, 4]: 0 first node (-1: no window), 1, 2 nodes along each axis, 3 points of
         a ring

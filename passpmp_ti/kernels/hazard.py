@@ -61,12 +61,16 @@ def lay_hazard(
             p = vec2(node % columns, node // columns) * grids[j, 3]
             p += vec2(grids[j, 0], grids[j, 1])
             total = kinds8(0.0)
-            for n in range(tally[0]):
+            # farther than a cell from where the robot may be, no look asks for a node
+            off = p - vec2(grids[j, 6], grids[j, 7])
+            reach = ti.sqrt(grids[j, 8]) + 1.5 * grids[j, 3]
+            objects = ti.select(off.dot(off) < reach * reach, tally[0], 0)
+            for n in range(objects):
                 if is_near(near, j * tally[0] + n, p):
                     for c in range(tally[1]):
                         row = (j * tally[0] + n) * tally[1] + c
-                        total += rows[row, 20] * rows[row, 21] * flow_parts(
-                            rows, places, pool, row, p
+                        total += (
+                            rows[row, 20] * rows[row, 21] * flow_parts(rows, places, pool, row, p)
                         )
             for r in ti.static(range(KINDS)):
                 layers[(begins[j, 0] + node) * KINDS + r] = total[r]
