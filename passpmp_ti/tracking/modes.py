@@ -34,7 +34,7 @@ class Mode:
 
 MODES = (
     Mode("still", settling=0.3, restlessness=0.1, stays=4.0),
-    Mode("walking", settling=np.inf, restlessness=0.004, stays=4.0),
+    Mode("walking", settling=np.inf, restlessness=0.003, stays=4.0),
     Mode("turning", settling=np.inf, restlessness=0.13, stays=1.0),
 )
 SWITCH = np.array([[0.0, 0.5, 0.5], [0.3, 0.0, 0.7], [0.2, 0.8, 0.0]])
