@@ -4,19 +4,20 @@ import numpy as np
 import pytest
 from filterpy.common import Q_continuous_white_noise
 from filterpy.kalman import IMMEstimator
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.stats import multivariate_normal
 
 import passpmp_ti as pti
 from passpmp_ti.bench.reliability import Reliability, touch_chance
-from passpmp_ti.tracking import Forecast, Sighting, imm, modes
+from passpmp_ti.tracking import Forecast, Sighting, follow, imm, modes
 from passpmp_ti.tracking.assignment import matched
 from passpmp_ti.tracking.detections import detect
 from passpmp_ti.tracking.forecast import forecast
 from passpmp_ti.tracking.segments import segments_of
 from passpmp_ti.tracking.visibility import seen_empty
 
+CHECK = settings(max_examples=40, deadline=None, derandomize=True)
 PEOPLE = pti.Settings(object_speed=2.0, object_width=0.4)
 HALF = np.radians(0.5)
 
@@ -87,6 +88,7 @@ def test_a_wall_is_no_object():
     assert len(segments_of(sighting(board, first=bearings[0]), PEOPLE).first) == 1
 
 
+@CHECK
 @given(distance=st.floats(1.0, 6.0), bearing=st.floats(-3.0, 3.0), radius=st.floats(0.21, 0.8))
 def test_the_centre_of_a_disc_is_found_behind_its_near_side(distance, bearing, radius):
     distance += radius
@@ -101,6 +103,28 @@ def test_the_centre_of_a_disc_is_found_behind_its_near_side(distance, bearing, r
     assert np.hypot(*(place[0] - centre)) < 2.5 * spacing + 0.01
     assert abs(body[0] - radius) < 2.5 * spacing + 0.01
     assert deviation[0] > 0
+
+
+RANGES = st.one_of(st.floats(0.05, 10.0), st.sampled_from([np.nan, np.inf, 2.0, 2.0, 2.1]))
+
+
+@CHECK
+@given(
+    sweeps=st.lists(st.lists(RANGES, min_size=2, max_size=40), min_size=1, max_size=3),
+    closed=st.booleans(),
+)
+def test_whatever_is_seen_each_return_has_a_track_unless_it_is_a_wall_s(sweeps, closed):
+    tracks = None
+    for k, ranges in enumerate(sweeps):
+        increment = 2 * np.pi / len(ranges) if closed else 0.03
+        seen = sighting(ranges, increment=increment, closed=closed)
+        objects = np.zeros(len(ranges), dtype=bool)
+        objects[segments_of(seen, PEOPLE).beams] = True
+        tracks = follow(tracks, [seen, seen], 0.1 * k, PEOPLE)
+        for owner in tracks.owner:
+            assert ((owner >= 0) == objects).all()
+            assert set(owner[owner >= 0]) <= set(tracks.ids)
+        assert len(tracks.forecast(tracks.stamp + np.array([0.5])).radius) == len(tracks)
 
 
 def test_who_is_half_hidden_is_placed_by_the_end_that_is_seen():
@@ -214,6 +238,7 @@ def forecast_of(bank, ahead, speed=2.0):
     return forecast(bank, np.full(len(bank), 0.3), 5.0, 5.0 + np.asarray(ahead), speed)
 
 
+@CHECK
 @given(count=st.integers(1, 5), seed=st.integers(0, 50), speed=st.sampled_from([0.0, 2.0, 20.0]))
 def test_forecasts_are_definite_and_keep_to_the_bound(count, seed, speed):
     bank = some_bank(count, seed, speed)

@@ -131,7 +131,11 @@ def forecast(
     covariance = F @ bank.covariance[:, :, None] @ F.swapaxes(-1, -2) + pace**2 * Q
     _narrow(covariance, bank.covariance, times - stamp, speed)
     return Forecast(
-        times=times, weight=bank.weight, mean=mean, covariance=covariance, radius=radius
+        times=times,
+        weight=bank.weight @ modes.switching(modes.CHANGE),
+        mean=mean,
+        covariance=covariance,
+        radius=radius,
     )
 
 

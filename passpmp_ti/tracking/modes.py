@@ -11,6 +11,9 @@ from filterpy.kalman import KalmanFilter
 
 SLOWEST = 0.01
 """Where a bound of 0 says that nothing moves, noises are those of this bound [m/s]."""
+CHANGE = 0.5
+"""A forecast has each mode's chance after this time, and its motion from now on: a mixture cannot
+tell of objects that change their mode under way [s]."""
 CALM = 0.2
 """Noises are at least those of an object at this share of the speed bound: who stands may start."""
 
@@ -30,8 +33,8 @@ class Mode:
 
 
 MODES = (
-    Mode("still", settling=0.3, restlessness=0.03, stays=4.0),
-    Mode("walking", settling=np.inf, restlessness=0.004, stays=4.0),
+    Mode("still", settling=0.3, restlessness=0.1, stays=4.0),
+    Mode("walking", settling=np.inf, restlessness=0.003, stays=4.0),
     Mode("turning", settling=np.inf, restlessness=0.13, stays=1.0),
 )
 SWITCH = np.array([[0.0, 0.5, 0.5], [0.3, 0.0, 0.7], [0.2, 0.8, 0.0]])

@@ -11,7 +11,7 @@ from passpmp_ti.settings import Settings
 from passpmp_ti.tracking.sighting import Sighting
 
 FLATTEST = math.radians(10.0)
-"""lambda of Borges & Aldon 2004, Sec. III-B: no surface is taken to be seen at a flatter angle."""
+"""lambda of Borges & Aldon 2004: no surface is taken to be seen at a flatter angle."""
 LONGEST = 5.0
 """What is longer than this many object widths is no object but a wall."""
 

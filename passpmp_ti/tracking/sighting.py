@@ -37,6 +37,8 @@ class Sighting:
         x, y = door.array("Sighting", "origin", self.origin, (2,))
         set_(self, "origin", (float(x), float(y)))
         bearings = door.array("Sighting", "bearings", self.bearings, (None,))
+        if not len(bearings):
+            raise ValueError("Sighting.bearings is empty; leave out a scan without beams")
         door.finite("Sighting", "increment", self.increment, above=0.0, unit="rad")
         door.finite("Sighting", "range_max", self.range_max, above=0.0, unit="m")
         for name in ("movable", "lost"):
