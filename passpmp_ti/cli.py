@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from passpmp_ti import door
 from passpmp_ti.bench import command
+from passpmp_ti.compare import command as comparing
 
 if TYPE_CHECKING:
     from passpmp_ti.sim.scenario import Scenario
@@ -155,6 +156,10 @@ def _bench(given: argparse.Namespace) -> int:
     return command.run(given, scenario_of)
 
 
+def _compare(given: argparse.Namespace) -> int:
+    return comparing.run(given, _settings(given))
+
+
 def _attack(given: argparse.Namespace) -> int:
     if given.replay:
         return _replay(given)
@@ -271,13 +276,13 @@ def _scenario(given: argparse.Namespace) -> Scenario:
     """The scenario with what the command line changes in it."""
     from passpmp_ti.sim.scenario import load_scenario
 
-    settings: dict[str, Any] = {}
-    for assignment in given.set or ():
-        name, value = _assignment(assignment)
-        settings[name] = value
-    if given.cycle is not None:
-        settings["cycle"] = given.cycle
-    return load_scenario(given.scenario).changed(settings, object_speed=given.object_speed)
+    return load_scenario(given.scenario).changed(_settings(given), object_speed=given.object_speed)
+
+
+def _settings(given: argparse.Namespace) -> dict[str, Any]:
+    """The fields of `Settings` that the command line changes."""
+    settings = dict(_assignment(assignment) for assignment in given.set or ())
+    return settings if given.cycle is None else settings | {"cycle": given.cycle}
 
 
 def _assignment(text: str) -> tuple[str, Any]:
@@ -364,6 +369,16 @@ def _parser() -> argparse.ArgumentParser:
     )
     command.add_options(bench)
     _scenario_changes(bench)
+
+    compare = _command(
+        commands,
+        "compare",
+        "drive the same worlds in several safety modes, and write a page about it",
+        _compare,
+        comparing.EXAMPLE,
+    )
+    comparing.add_options(compare)
+    _scenario_changes(compare)
 
     _attack_options(
         _command(
