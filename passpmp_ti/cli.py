@@ -7,6 +7,7 @@ import contextlib
 import io
 import math
 import os
+import shlex
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -28,6 +29,7 @@ FAILED, BAD_INPUT, INTERRUPTED = 1, 2, 130
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command; returns its exit code."""
     given = _parser().parse_args(arguments)
+    given.command = shlex.join(["passpmp", *(sys.argv[1:] if arguments is None else arguments)])
     os.environ.setdefault("ENABLE_TAICHI_HEADER_PRINT", "0")
     try:
         return int(given.action(given))

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from passpmp_ti.compare.axes import Axes, Axis, legend
 from passpmp_ti.compare.intervals import CONFIDENCE
 from passpmp_ti.compare.reliability import DECADES
+from passpmp_ti.compare.rows import percent
 from passpmp_ti.compare.summary import Group
 from passpmp_ti.compare.svg import Drawing
 
@@ -30,7 +31,7 @@ def contacts_chart(groups: Mapping[str, Group]) -> str:
     ]  # fmt: skip
     axis = Axis(
         low=0.0, high=min(most, 1.0), percent=True,
-        label=f"episodes with a contact while moving, {CONFIDENCE:.0%} interval",
+        label=f"episodes with a contact while moving, {percent(CONFIDENCE, '.0%')} interval",
     )  # fmt: skip
     return _rows_chart("Contacts while moving", list(groups), rows, axis)
 
@@ -86,19 +87,19 @@ def reliability_chart(groups: Mapping[str, Group]) -> str:
     drawing = Drawing((WIDTH, HEIGHT), "Risk promised against risk met")
     axes = _axes(
         Axis(low=FLOOR, high=1.0, log=True, label="risk promised (at the left end: none)"),
-        Axis(low=FLOOR, high=1.0, log=True, label="risk met"),
+        Axis(low=FLOOR, high=1.0, log=True, label="risk met (at the lower end: never)"),
     )
     axes.draw(drawing)
     drawing.area([axes.at(FLOOR, FLOOR), axes.at(1, 1), axes.at(FLOOR, 1)], "bad")
     drawing.line([axes.at(FLOOR, FLOOR), axes.at(1, 1)], "even")
     drawing.words((LEFT + 10, TOP + 18), "met more than promised", "hint")
     for n, (name, group) in enumerate(groups.items()):
-        aside = 4.0 * (n - 0.5 * (len(groups) - 1))  # bins of several variants beside each other
+        aside = 9.0 * (n - 0.5 * (len(groups) - 1))  # bins of several variants beside each other
         for b in group["promises"]["bins"]:
             x = axes.across(b["promised"]) + aside
             kind = f"v{n % 6}"
             drawing.line([(x, axes.up(b["share_low"])), (x, axes.up(b["share_high"]))],
-                         f"bar {kind}")  # fmt: skip
+                         f"bar thin {kind}")  # fmt: skip
             tip = (
                 f"{name}: promised {b['promised']:.2g}, met {b['met']} of {b['count']}"
                 f" = {b['share']:.2g}"

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import argparse
 import datetime
-import shlex
 import sys
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,8 +13,7 @@ from passpmp_ti import door
 from passpmp_ti.settings import MODES
 
 if TYPE_CHECKING:
-    from passpmp_ti.compare.comparison import Comparison
-    from passpmp_ti.compare.job import Key, Result
+    from passpmp_ti.compare.job import Job, Key, Result
     from passpmp_ti.compare.workers import Workers
 
 EXAMPLE = """passpmp compare crowded corridor_person --episodes 100 --out out/compare
@@ -75,6 +73,7 @@ def run(given: argparse.Namespace, changes: Mapping[str, Any]) -> int:
     from passpmp_ti.bench.machine import cores
     from passpmp_ti.compare import table
     from passpmp_ti.compare.comparison import Comparison, carry_out_all, read_all
+    from passpmp_ti.compare.film import filmed
     from passpmp_ti.compare.progress import ComparisonProgress
     from passpmp_ti.compare.report import document, write_report
     from passpmp_ti.compare.variant import modes
@@ -87,17 +86,21 @@ def run(given: argparse.Namespace, changes: Mapping[str, Any]) -> int:
         object_speed=given.object_speed, observe=not given.no_observer,
         judge_every=given.judge_every,
     )  # fmt: skip
+    wanted = given.seed if given.video_seed is None else given.video_seed
+    shots = {
+        name: comparison.jobs_of(scenario, door.whole("compare", "video_seed", wanted, least=0))
+        for name, scenario in zip(comparison.names, comparison.scenarios, strict=True)
+    }
     folder = Path(given.out)
     progress = ComparisonProgress(comparison)
     interrupted = False
     results: Mapping[Key, Result] = {}
-    videos: dict[str, str] = {}
     with opened(given.scheduler, count) as workers:
         try:
             results = carry_out_all(comparison, folder, workers, progress.see)
             if not given.no_video:
                 progress.end()
-                videos = _films(comparison, given.video_seed, workers, folder)
+                _film_all(shots, workers, folder)
         except KeyboardInterrupt:
             interrupted = True
             results = read_all(comparison, folder)
@@ -105,10 +108,11 @@ def run(given: argparse.Namespace, changes: Mapping[str, Any]) -> int:
             progress.end()
     told = document(
         comparison, results, date=datetime.date.today().isoformat(),
-        command=shlex.join(["passpmp", *sys.argv[1:]]),
+        command=given.command,
         workers=f"{count} workers" if given.scheduler is None else f"Dask at {given.scheduler}",
     )  # fmt: skip
-    write_report(folder, told, videos)
+    videos = {name: filmed(folder, jobs) for name, jobs in shots.items()}
+    write_report(folder, told, {n: path.name for n, path in videos.items() if path.exists()})
     print(table.text(told))
     print(f"page: {folder / 'index.html'}")
     if interrupted:
@@ -121,24 +125,19 @@ def run(given: argparse.Namespace, changes: Mapping[str, Any]) -> int:
     return FAILED if any(r["error"] for r in results.values()) else 0
 
 
-def _films(
-    comparison: Comparison, seed: int | None, workers: Workers, folder: Path
-) -> dict[str, str]:
-    """The videos that are not there yet; by scenario, their names."""
-    from passpmp_ti.compare.film import film
+def _film_all(shots: Mapping[str, Sequence[Job]], workers: Workers, folder: Path) -> None:
+    """Make the videos that are not there yet."""
+    from passpmp_ti.compare.film import film, filmed
 
-    wanted = comparison.seed if seed is None else door.whole("compare", "video_seed", seed, least=0)
-    videos = {}
-    for name, reference in zip(comparison.names, comparison.scenarios, strict=True):
-        print(f"video of {name}, seed {wanted}", file=sys.stderr)
-        jobs = comparison.jobs_of(reference, wanted)
+    for name, jobs in shots.items():
+        path = filmed(folder, jobs)
+        if path.exists():
+            continue
+        print(f"video of {name}, seed {jobs[0].seed}", file=sys.stderr)
         try:
-            path = film(jobs, workers, folder / f"{name}-seed-{wanted}.mp4")
+            film(jobs, workers, path)
         except RuntimeError as error:  # the numbers are worth their page without it
             print(f"passpmp: no video of {name}: {error}", file=sys.stderr)
-            continue
-        videos[name] = path.name
-    return videos
 
 
 def _placed(scenario: str) -> str:

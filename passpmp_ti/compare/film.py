@@ -70,7 +70,7 @@ def film(jobs: Sequence[Job], workers: Workers, path: Path) -> Path:
         path: of the video; see `VideoWriter` for its suffix.
 
     Returns:
-        The path that was written.
+        What was written.
 
     Raises:
         RuntimeError: no video can be written here.
@@ -82,12 +82,21 @@ def film(jobs: Sequence[Job], workers: Workers, path: Path) -> Path:
     ordered = [reels[job.variant.name] for job in jobs]
     beside = not _stands_above(jobs[0].loaded().bounds)
     size = _joined([_decoded(r.frames[0]) for r in ordered], beside).shape[1::-1]
-    with VideoWriter(path, (size[0], size[1]), RATE) as writer:
+    with VideoWriter(path.with_stem("unfinished"), (size[0], size[1]), RATE) as writer:
         count = max(len(r.frames) for r in ordered) + round(LINGER * RATE)
         for n in range(count):
             frames = [_decoded(r.frames[min(n, len(r.frames) - 1)]) for r in ordered]
             writer.write(_joined(frames, beside))
-        return writer.path
+    # there whole or not at all: a video that is there is not made again
+    return writer.path.replace(path.with_suffix(writer.path.suffix))
+
+
+def filmed(folder: Path, jobs: Sequence[Job]) -> Path:
+    """Where the video of jobs of one scenario and seed lies, or is to lie."""
+    scenario, _, seed = jobs[0].key
+    stem = "-".join([scenario, f"seed-{seed}", *(job.variant.name for job in jobs)])
+    there = [folder / f"{stem}{suffix}" for suffix in (".mp4", ".webm")]
+    return next((path for path in there if path.exists()), there[0])
 
 
 class _Camera:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
+from passpmp_ti.compare.rows import percent
 from passpmp_ti.compare.summary import Group
 
 
@@ -15,17 +16,6 @@ def findings(groups: Mapping[str, Group]) -> list[str]:
     """
     names = list(groups)
     return [_sentence(names[0], groups[names[0]], n, groups[n]) for n in names[1:]]
-
-
-def totals(scenarios: Mapping[str, Mapping[str, Group]], variants: Sequence[str]) -> list[str]:
-    """One sentence for every variant: its contacts while moving, in all scenarios."""
-    told = []
-    for variant in variants:
-        groups = [scenario[variant] for scenario in scenarios.values()]
-        episodes = sum(g["episodes"] for g in groups)
-        touched = sum(g["contact_episodes"] for g in groups)
-        told.append(f"{variant}: contacts while moving in {touched} of {episodes} episodes.")
-    return told
 
 
 def _sentence(first: str, before: Group, name: str, now: Group) -> str:
@@ -45,11 +35,11 @@ def _bought(before: Group, now: Group) -> str:
     else:
         told = f"{abs(later):.1f} s {'later' if later > 0 else 'sooner'}"
         if before["time_median"]:
-            told += f" ({abs(later) / before['time_median']:.0%})"
+            told += f" ({percent(abs(later) / before['time_median'], '.0%')})"
     told += f" on the median of {now['pairs']} pairs"
     low, high = now["later_low"], now["later_high"]
     if low is not None and low <= 0 <= high and abs(later) >= 0.05:
-        told += ", which chance explains (95 % interval"
+        told += ", which chance may explain (95 % interval"
     elif low is not None:
         told += " (95 % interval"
     if low is not None:
@@ -61,9 +51,9 @@ def _paid(before: Group, now: Group) -> str:
     """Contacts, and what a cycle costs."""
     told = (
         f"it touched somebody while moving in {now['contact_episodes']} of {now['episodes']}"
-        f" episodes ({now['contact_low']:.1%} to {now['contact_high']:.1%}) instead of"
+        f" episodes ({percent(now['contact_low'])} to {percent(now['contact_high'])}) instead of"
         f" {before['contact_episodes']} of {before['episodes']}"
-        f" ({before['contact_low']:.1%} to {before['contact_high']:.1%})"
+        f" ({percent(before['contact_low'])} to {percent(before['contact_high'])})"
     )
     if now["cost_ratio"] is not None:
         told += f"; a cycle takes {now['cost_ratio']:.2f} times as long"

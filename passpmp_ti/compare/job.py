@@ -15,6 +15,10 @@ from passpmp_ti.bench.machine import commit, processor
 from passpmp_ti.compare.observer import Observer
 from passpmp_ti.compare.promise import Promises
 from passpmp_ti.compare.variant import Variant
+from passpmp_ti.planner.navigator import Navigator
+from passpmp_ti.planner.rehearsal import rehearse
+from passpmp_ti.robots import Robot
+from passpmp_ti.settings import Settings
 from passpmp_ti.sim.episode import CycleInfo, Episode, simulate
 from passpmp_ti.sim.scenario import Scenario, load_scenario
 
@@ -25,6 +29,8 @@ Key = tuple[str, str, int]
 
 ONE_AT_A_TIME = Lock()
 """Kernels share buffers: two episodes in two threads of one process would mix them up."""
+REHEARSED: set[tuple[type[Robot], str]] = set()
+"""Robots and modes whose kernels this process has compiled."""
 LEFT_OUT = ("scenario", "mode", "seed", "interrupted")
 """Entries of an episode's summary that a result has elsewhere."""
 
@@ -84,7 +90,17 @@ def carry_out(job: Job) -> Result:
         return told
 
 
+def _rehearse(robot: Robot, settings: Settings) -> None:
+    """Compile what cycles need, once a process: else the first episodes would seem slow."""
+    kernels = (type(robot), settings.mode)  # all else are numbers, which kernels are told
+    if kernels not in REHEARSED:
+        rehearse(Navigator, robot, settings)
+        REHEARSED.add(kernels)
+
+
 def _drive(job: Job) -> Result:
+    scenario = job.loaded()
+    _rehearse(scenario.robot, scenario.settings)
     promises = Promises(job.judge_every)
     observer = Observer() if job.observe else None
     watchers: list[Callable[[CycleInfo], None]] = [promises.see]
@@ -95,7 +111,7 @@ def _drive(job: Job) -> Result:
         for watcher in watchers:
             watcher(info)
 
-    episode = simulate(job.loaded(), seed=job.seed, on_cycle=see)
+    episode = simulate(scenario, seed=job.seed, on_cycle=see)
     if episode.interrupted:
         raise KeyboardInterrupt  # half an episode is none
     return {

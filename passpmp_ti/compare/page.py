@@ -84,8 +84,8 @@ def _section(name: str, scenario: Mapping[str, Any], video: str | None) -> list[
     parts += [_table(["", *groups], rows), "<div class='charts'>"]
     for title, chart in (
         ("Contacts while moving", charts.contacts_chart(groups)),
-        ("Time to the goal", charts.arrival_chart(groups, scenario["duration"])),
         ("Cost of a cycle", charts.cost_chart(groups)),
+        ("Time to the goal", charts.arrival_chart(groups, scenario["duration"])),
         ("Risk promised, risk met", charts.reliability_chart(groups)),
     ):
         parts.append(f"<figure><figcaption>{title}</figcaption>{chart}</figure>")
@@ -93,7 +93,7 @@ def _section(name: str, scenario: Mapping[str, Any], video: str | None) -> list[
     if video:
         file = escape(video, quote=True)
         parts.append(
-            f"<figure><figcaption>The same seed, side by side</figcaption>"
+            "<figure><figcaption>One seed in all of them, twice as fast as it happened</figcaption>"
             f"<video controls loop muted preload='metadata' src='{file}'></video></figure>"
         )
     parts += [

@@ -35,10 +35,17 @@ class Row:
         return NOTHING if group[self.keys[0]] is None else told
 
 
+def percent(share: float, form: str = ".1%") -> str:
+    """A share in per cent, with a space as SI asks for."""
+    return format(share, form).replace("%", " %")
+
+
 def _told(value: Any, form: str) -> str:
-    """A number by a format as Python knows it; with `ms` at its end seconds in milliseconds."""
+    """A number by a format as Python knows it; seconds in milliseconds with `ms` at its end."""
     if value is None:
         return NOTHING
+    if form.endswith("%"):
+        return percent(value, form)
     if form.endswith("ms"):
         return f"{format(1e3 * value, form[:-2])} ms"
     return format(value, form)

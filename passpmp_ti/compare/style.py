@@ -36,7 +36,8 @@ th:first-child { text-align: left; padding-left: 0; }
 figure { margin: 0; padding: .8rem 1rem 1rem; background: var(--sheet); border: 1px solid var(--rule); border-radius: 8px; }
 .charts + figure { margin-top: 1rem; }
 figcaption { font-weight: 600; margin-bottom: .4rem; }
-svg, video { display: block; width: 100%; height: auto; }
+svg { display: block; width: 100%; height: auto; }
+video { display: block; max-width: 100%; max-height: 85vh; }
 svg text { fill: var(--ink); font-size: 13px; }
 svg .tick, svg .label, svg .hint { fill: var(--muted); }
 svg .tick { font-size: 12px; }
@@ -48,7 +49,8 @@ svg .even { stroke: var(--muted); stroke-width: 1.2; stroke-dasharray: 5 4; }
 svg .bad { fill: var(--bad); }
 svg .curve { stroke-width: 2.2; stroke-linejoin: round; }
 svg .bar { stroke-width: 5; stroke-linecap: round; opacity: .45; }
-svg .mark { stroke: var(--sheet); stroke-width: 1; }
+svg .thin { stroke-width: 3.5; }
+svg .mark { stroke-width: 1; }
 svg .v0 { stroke: var(--v0); } svg .mark.v0 { fill: var(--v0); stroke: var(--sheet); }
 svg .v1 { stroke: var(--v1); } svg .mark.v1 { fill: var(--v1); stroke: var(--sheet); }
 svg .v2 { stroke: var(--v2); } svg .mark.v2 { fill: var(--v2); stroke: var(--sheet); }
