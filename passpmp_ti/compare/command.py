@@ -20,7 +20,7 @@ EXAMPLE = """passpmp compare crowded corridor_person --episodes 100 --out out/co
   passpmp compare crowded --object-speed 5 --episodes 20 --workers 4 --no-observer
   passpmp compare eth --episodes 100 --scheduler tcp://10.0.0.1:8786"""
 FAILED, INTERRUPTED = 1, 130
-"""Exit codes: an episode raised, Ctrl-C."""
+"""Exit codes: an episode raised or a worker died, Ctrl-C."""
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -77,7 +77,7 @@ def run(given: argparse.Namespace, changes: Mapping[str, Any]) -> int:
     from passpmp_ti.compare.progress import ComparisonProgress
     from passpmp_ti.compare.report import document, write_report
     from passpmp_ti.compare.variant import modes
-    from passpmp_ti.compare.workers import opened
+    from passpmp_ti.compare.workers import LostWorkerError, opened
 
     count = door.whole("compare", "workers", given.workers or cores(), least=1)
     comparison = Comparison(
@@ -93,7 +93,7 @@ def run(given: argparse.Namespace, changes: Mapping[str, Any]) -> int:
     }
     folder = Path(given.out)
     progress = ComparisonProgress(comparison)
-    interrupted = False
+    ended_early: BaseException | None = None
     results: Mapping[Key, Result] = {}
     with opened(given.scheduler, count) as workers:
         try:
@@ -101,8 +101,8 @@ def run(given: argparse.Namespace, changes: Mapping[str, Any]) -> int:
             if not given.no_video:
                 progress.end()
                 _film_all(shots, workers, folder)
-        except KeyboardInterrupt:
-            interrupted = True
+        except (KeyboardInterrupt, LostWorkerError) as cause:
+            ended_early = cause
             results = read_all(comparison, folder)
         finally:
             progress.end()
@@ -115,13 +115,16 @@ def run(given: argparse.Namespace, changes: Mapping[str, Any]) -> int:
     write_report(folder, told, {n: path.name for n, path in videos.items() if path.exists()})
     print(table.text(told))
     print(f"page: {folder / 'index.html'}")
-    if interrupted:
+    if isinstance(ended_early, KeyboardInterrupt):
         print(
             f"passpmp: interrupted; {len(results)} of {len(comparison.jobs())} episodes; the same"
             " command goes on",
             file=sys.stderr,
         )
         return INTERRUPTED
+    if ended_early is not None:
+        print(f"passpmp: {ended_early}", file=sys.stderr)
+        return FAILED
     return FAILED if any(r["error"] for r in results.values()) else 0
 
 

@@ -64,5 +64,7 @@ class ComparisonProgress:
 
 
 def _time(seconds: float) -> str:
+    if seconds < 100:
+        return f"{round(seconds)} s"
     minutes = round(seconds / 60)
     return f"{minutes // 60}:{minutes % 60:02d} h" if minutes >= 60 else f"{minutes} min"

@@ -6,9 +6,22 @@ import contextlib
 import multiprocessing
 import os
 import signal
+import threading
 from collections.abc import Callable, Generator, Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Future, ProcessPoolExecutor, wait
 from typing import Any, Protocol, TypeVar
+
+
+class LostWorkerError(RuntimeError):
+    """A worker died of something that no job can tell of; the others may have too."""
+
+    def __init__(self, cause: object) -> None:
+        """`cause`: what is known."""
+        super().__init__(
+            f"a worker died ({cause}); if memory ran out, take fewer --workers. What is finished is"
+            " written, and the same command goes on"
+        )
+
 
 J = TypeVar("J")
 R = TypeVar("R")
@@ -60,6 +73,8 @@ class Processes:
                 for one in done:
                     yield one.result()
             pool.shutdown()
+        except BrokenExecutor as cause:
+            raise LostWorkerError(cause) from cause
         except BaseException:
             pool.shutdown(wait=False, cancel_futures=True)
             for child in set(multiprocessing.active_children()) - before:
@@ -99,7 +114,7 @@ class Cluster:
             ) from cause
 
     def each(self, function: Callable[[J], R], jobs: Sequence[J]) -> Generator[R, None, None]:
-        from distributed import as_completed
+        from distributed import KilledWorker, as_completed
 
         # not pure: a job that was done before is not to be answered from somebody's memory
         futures = self._client.map(function, jobs, pure=False)
@@ -107,6 +122,8 @@ class Cluster:
             for future in as_completed(futures):
                 yield future.result()
                 future.release()
+        except KilledWorker as cause:
+            raise LostWorkerError(cause) from cause
         finally:
             self._client.cancel(futures)
 
@@ -139,6 +156,15 @@ def opened(scheduler: str | None, count: int) -> Iterator[Workers]:
 
 
 def _begin() -> None:
-    """A worker leaves Ctrl-C to its parent and has one thread for everything."""
+    """A worker leaves Ctrl-C to its parent, has one thread for all it computes, and ends with its
+    parent, however that ends."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     os.environ["OMP_NUM_THREADS"] = "1"
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+
+
+def _end_with_parent() -> None:
+    parent = multiprocessing.parent_process()
+    assert parent is not None
+    parent.join()
+    os._exit(1)
