@@ -8,7 +8,8 @@ from typing import Any
 from passpmp_ti import door
 from passpmp_ti.robots import CarLike, Robot
 
-MODES = ("conservative",)
+MODES = ("conservative", "hybrid", "probabilistic")
+RISKS = ("any", "paper")
 OPTIMIZERS = ("pso", "exhaustive")
 GUIDES = ("safe_time", "euclidean")
 DISTANCES = ("mean", "final")
@@ -22,7 +23,9 @@ class Settings:
 
     # what is assumed of the world
     mode: str = "conservative"
-    """Safety mode."""
+    """Safety mode. "conservative": nothing is assumed but bounds, and the guarantee is strict.
+    "hybrid": a mover that is tracked stays where its track says, at `confidence`. "probabilistic":
+    risk is a number, bounded by `allowed_risk`."""
     object_speed: float = 2.0
     """v_b, greatest speed of any object [m/s]; 0 is allowed: nothing moves."""
     object_width: float = 0.4
@@ -35,6 +38,22 @@ class Settings:
     [m/s]; None: as `object_speed`; 0: what is there stands still for good, like a wall."""
     clear_radius: float = 0.0
     """Disc about the robot's start that is declared empty [m]; for robots with blind sectors."""
+
+    # what is assumed of movers that are tracked, and of the hidden ones as a chance
+    confidence: float = 0.99
+    """Chance that a tracked mover stays, over all of the horizon, where "hybrid" takes it to be."""
+    allowed_risk: float = 0.02
+    """Greatest chance of a contact while moving that one plan may have."""
+    allowed_risk_rate: float = 0.02
+    """The same for each second of a plan [1/s]."""
+    risk: str = "any"
+    """"any": the chance of a contact at any time with any mover, bounded from above; "paper": eqs.
+    9-17 as printed, products over times and over the states of a plan."""
+    emergence: float = 0.02
+    """Chance, each time the robot plans, that somebody comes out of what is hidden on the worst
+    way."""
+    hidden_speeds: tuple[float, ...] = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0)
+    """Equally likely speeds of who comes out, as shares of `object_speed`."""
 
     # margins, each added to the unsafe side
     tracking_error: float = 0.0
@@ -115,6 +134,8 @@ class Settings:
         door.choice(name, "optimizer", self.optimizer, OPTIMIZERS)
         door.choice(name, "guide", self.guide, GUIDES)
         door.choice(name, "distance", self.distance, DISTANCES)
+        door.choice(name, "risk", self.risk, RISKS)
+        self._check_chances()
         for field_ in (
             "object_speed",
             "object_radius",
@@ -192,6 +213,36 @@ class Settings:
                     f" {self.time_step:g} s, so that plans are verified and held at the same times"
                 )
 
+    def _check_chances(self) -> None:
+        name = "Settings"
+        for field_ in ("confidence", "allowed_risk"):
+            value = door.finite(name, field_, getattr(self, field_))
+            if not 0.0 < value < 1.0:
+                raise ValueError(
+                    f"Settings.{field_} is a chance, above 0 and below 1; got {value:g}; for no"
+                    ' risk at all take mode="conservative"'
+                )
+        door.finite(name, "allowed_risk_rate", self.allowed_risk_rate, above=0.0, unit="1/s")
+        door.finite(name, "emergence", self.emergence, least=0.0, most=1.0)
+        if isinstance(self.hidden_speeds, (str, bytes)) or not hasattr(
+            self.hidden_speeds, "__iter__"
+        ):
+            raise ValueError(
+                f"Settings.hidden_speeds must be shares of object_speed; got {self.hidden_speeds!r}"
+            )
+        object.__setattr__(self, "hidden_speeds", tuple(self.hidden_speeds))
+        if not self.hidden_speeds:
+            raise ValueError(
+                "Settings.hidden_speeds is empty; give shares of object_speed, (1.0,) for the bound"
+            )
+        for n, share in enumerate(self.hidden_speeds):
+            door.finite(name, f"hidden_speeds[{n}]", share, least=0.0, most=1.0)
+        if self.tracks and self.object_speed == 0.0:
+            raise ValueError(
+                f'Settings.mode = "{self.mode}" needs tracks, and where object_speed is 0 nothing'
+                ' moves that could be tracked; take mode="conservative"'
+            )
+
     @classmethod
     def for_robot(cls, robot: Robot, **changes: Any) -> Settings:
         """Settings that drive `robot` well, with `changes` on top.
@@ -234,6 +285,17 @@ class Settings:
                     f" it has {', '.join(known)}"
                 )
         return replace(self, **changes)
+
+    @property
+    def tracks(self) -> bool:
+        """Whether movers are tracked."""
+        return self.mode != "conservative"
+
+    @property
+    def horizon(self) -> float:
+        """How long after a scan the longest plan of its cycle is braked for [s], without braking
+        itself (Property 3): what a model speaks of ends with it."""
+        return 2 * self.cycle + sum(self.primitives)
 
     @property
     def unseen_speed(self) -> float:

@@ -5,6 +5,7 @@ import pytest
 import taichi as ti
 from scipy.ndimage import binary_dilation, distance_transform_edt
 
+from passpmp_ti import device
 from passpmp_ti.grid.arrival import _scratch, _unseen_square
 from passpmp_ti.kernels.arrival import LATEST, NEVER, SAMPLING, arrival_times
 from passpmp_ti.kernels.beams import SLACK
@@ -38,7 +39,8 @@ def found(seen, marks, left, blind_speed):
     ticks = np.empty(seen.shape, dtype=np.uint16)
     arrival_times(
         seen, marks, left, NOTHING, 0, 0, -1, 1, _unseen_square(CELL, CLEARANCE),
-        int(left is not marks), CELL, CLEARANCE, SPEED, blind_speed, 0.0, *_scratch(SIZE), ticks,
+        int(left is not marks), CELL, CLEARANCE, SPEED, blind_speed, 0.0, device.share(),
+        *_scratch(SIZE), ticks,
     )  # fmt: skip
     return ticks
 

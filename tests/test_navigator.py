@@ -1,11 +1,16 @@
 """The cycle: what is held always ends at rest, whatever the world or the sensor does."""
 
+import pickle
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from oracle import exact
 
 from passpmp_ti import CarLike, DifferentialDrive, Navigator, Scan, Settings, Trajectory
 from passpmp_ti.faults.kinds import INSIDE, broken_inside
+from passpmp_ti.planner import navigator as cycle
+from passpmp_ti.planner.coast import decision_time
 from passpmp_ti.planner.place import only_fits_now
 
 CHAIR = DifferentialDrive()
@@ -477,6 +482,24 @@ def test_the_clear_disc_is_declared_about_the_start_only():
 
 
 # the record -----------------------------------------------------------------------------------
+
+
+def test_the_decision_time_is_worked_out_when_somebody_asks(monkeypatch):
+    asked = []
+    monkeypatch.setattr(
+        cycle, "decision_time", lambda *given: asked.append(given) or decision_time(*given)
+    )
+    navigator, stamp, state = underway()
+    navigator.update(scan_at(state, stamp), state)
+    record = navigator.record
+    assert not asked
+    packed = pickle.dumps(record)
+    assert asked == [(record.model, record.chosen, stamp, stamp + CYCLE)]
+    expected = decision_time(*asked[0])
+    assert record.decision_time == pickle.loads(packed).decision_time == expected
+    # what is kept of it holds on to no model
+    assert replace(record, model=None, chosen=None).decision_time == expected
+    assert len(asked) == 1
 
 
 def test_the_record_says_what_happened():

@@ -9,7 +9,8 @@ import pytest
 from passpmp_ti import Settings, device
 from passpmp_ti.grid.memory import broken_premises
 from passpmp_ti.grid.window import Window
-from passpmp_ti.planner.vanished import FEWEST, LEAST_SHARE, vanished
+from passpmp_ti.kernels.visibility import MOVABLE_CELLS, STATIC_CELLS
+from passpmp_ti.planner.vanished import FEWEST, LEAST_SHARE, surfaces, vanished
 
 SIZE, CELL = 48, 0.1
 SETTINGS = Settings(cell=CELL, object_width=0.4, object_speed=3.0)
@@ -26,13 +27,16 @@ def random_pair(seed):
     for j, i in generator.integers(0, SIZE, (int(generator.integers(1, 25)), 2)):
         seen[max(j - 2, 0) : j + 3, max(i - 1, 0) : i + 2] = False
     surfaces = generator.random((2, SIZE, SIZE)) < generator.choice([0.002, 0.01, 0.05])
+    marks = np.ones((5, SIZE, SIZE), dtype=np.uint8)
+    marks[[STATIC_CELLS, MOVABLE_CELLS]] = ~surfaces
     before = SimpleNamespace(
-        static=surfaces[0], movable=surfaces[1], window=window_at((5, -3)), stamp=1.0
+        static=surfaces[0], movable=surfaces[1], marks=marks, window=window_at((5, -3)), stamp=1.0
     )
     shift = generator.integers(-6, 7, 2)
     corner = (5 + int(shift[0]), -3 + int(shift[1]))
     now = SimpleNamespace(
-        seen=seen, window=window_at(corner), cell=CELL, stamp=1.1, settings=SETTINGS
+        seen=seen, seen_cells=seen.astype(np.uint8), window=window_at(corner), cell=CELL,
+        stamp=1.1, settings=SETTINGS,
     )
     return before, now
 
@@ -63,6 +67,7 @@ def test_those_are_gone_whose_whole_square_is_empty(timeless):
         before, now = random_pair(seed)
         wanted = vanished_plainly(before, now, timeless)
         given = vanished(before, now, timeless=timeless)
+        assert surfaces(before) == np.count_nonzero(before.marks == 0)
         assert given.startswith(wanted)
         assert bool(given) == bool(wanted)
         with device.forced():

@@ -54,6 +54,7 @@ def random_tree(nodes: int, generator: np.random.Generator) -> RandomTree:
         last = min(int(first[end]), nodes)
         value[end:last] += value[link[end:last, PARENT]]
         depth, end = depth + 1, last
-    cost = np.zeros((nodes, 5), dtype=np.float32)
+    cost = np.ones((nodes, 6), dtype=np.float32)
+    cost[:, :5] = 0.0
     cost[:, 1] = value - value.min() + 1.0
     return RandomTree(device.put(link), device.put(cost), nodes, depth)

@@ -271,7 +271,6 @@ INSIDE = {
     "choice": ("Navigator", "_choose"),
     "plan": (None, "trajectory_to"),
     "second check": (None, "still_clear"),
-    "decision time": (None, "decision_time"),
 }
 """Where the planner can be made to raise: the class (None: the module) and the name."""
 

@@ -54,7 +54,7 @@ class _Scratch(threading.local):
         self._arrays: dict[tuple[int, bool], tuple[device.Array, device.Array]] = {}
 
     def __call__(self, size: int) -> tuple[device.Array, device.Array]:
-        """Squared distances, and the least of each chunk of rows, of a window of `size` cells."""
+        """Squared distances, and the least of each chunk's blocks, of a window of `size` cells."""
         key = size, device.resident()
         if key not in self._arrays:
             blocks = size // LANES
@@ -137,6 +137,6 @@ def arrival(
     arrival_times(
         seen, marks, left, memory, *shift, age, BORDER, _unseen_square(window.cell, clearance),
         int(size > 0), window.cell, clearance, settings.object_speed, blind_speed,
-        settings.stamp_error, *_scratch(window.size), ticks,
+        settings.stamp_error, device.share(), *_scratch(window.size), ticks,
     )  # fmt: skip
     return ticks, left, broken

@@ -37,6 +37,11 @@ def check_previous(previous: FutureModel, robot: Robot, settings: Settings, stam
             f"{owner} has cells of {previous.cell:g} m, settings.cell is {settings.cell:g} m;"
             " start without memory"
         )
+    if previous.settings.tracks and not settings.tracks:
+        raise ValueError(
+            f"{owner} left out the movers that it tracked (mode = {previous.settings.mode!r}), and"
+            f" settings.mode is {settings.mode!r} now; start without memory"
+        )
     weaker = [
         name
         for name, before, now in _assumptions(previous.settings, settings, robot)
@@ -67,7 +72,7 @@ def remembered_ticks(previous: FutureModel | None) -> device.Array:
     """What a model remembers: [J, I] uint16; one empty cell where there is no model."""
     if previous is None:
         return device.put(np.zeros((1, 1), dtype=np.uint16))
-    return device.put(previous.ticks)
+    return device.put(previous.hidden_ticks)
 
 
 def broken_premises(
@@ -79,7 +84,8 @@ def broken_premises(
     settings: Settings,
 ) -> np.ndarray:
     """[n, 2] returns [m] where memory says that nothing can be yet."""
-    returns = views.returns(window.anchor)
+    # who is tracked has no cone in memory: he stands where it knows of nobody
+    returns = views.untracked(window.anchor)
     # Memory's margins were against errors that this return may have too, and it speaks of a
     # cell's every point while the return is compared with its centre.
     radius = robot.disc_radius - settings.range_noise - 2 * settings.localisation_error
@@ -89,7 +95,7 @@ def broken_premises(
     broken = device.empty((len(returns),), np.int32)
     contradicted(
         device.put((returns - np.array(previous.window.anchor)).astype(np.float32)),
-        previous.ticks, age, *previous.window.corner, window.cell, radius, broken,
+        previous.hidden_ticks, age, *previous.window.corner, window.cell, radius, broken,
     )  # fmt: skip
     return returns[device.host(broken) == 1]
 
@@ -107,7 +113,7 @@ def without_intruders(
     # whoever stands there reaches behind the surface that was seen
     grown = clearance + settings.object_width
     cap_memory(
-        device.put(distance_between_cells(mask)), device.put(previous.ticks), window.cell, grown,
-        settings.object_speed, settings.stamp_error, age, remembered,
+        device.put(distance_between_cells(mask)), device.put(previous.hidden_ticks), window.cell,
+        grown, settings.object_speed, settings.stamp_error, age, remembered,
     )  # fmt: skip
     return remembered

@@ -5,19 +5,24 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from passpmp_ti import backend, device, door
 from passpmp_ti.grid.arrival import arrival, rasterised
 from passpmp_ti.grid.body import Body, bodies, to_poses
+from passpmp_ti.grid.chances import Chances, chances_of, no_chances
 from passpmp_ti.grid.memory import check_previous
 from passpmp_ti.grid.spans import spans_of
 from passpmp_ti.grid.static_map import StaticMap
-from passpmp_ti.grid.view import Views, views_of
+from passpmp_ti.grid.tubes import NO_TUBES, capped, layer_times, overlaid, tubes_of
+from passpmp_ti.grid.view import Labels, Views, labels_of, views_of
 from passpmp_ti.grid.window import Window, size_for
 from passpmp_ti.kernels.arrival import NEVER
+from passpmp_ti.kernels.beams import LOST, MOVABLE
 from passpmp_ti.kernels.check import check_path, check_states
+from passpmp_ti.kernels.risk import path_risk, states_risk
 from passpmp_ti.kernels.visibility import (
     BLIND_SOURCES,
     MOVABLE_CELLS,
@@ -28,6 +33,9 @@ from passpmp_ti.kernels.visibility import (
 from passpmp_ti.robots import Robot
 from passpmp_ti.scan import Scan
 from passpmp_ti.settings import Settings
+
+if TYPE_CHECKING:
+    from passpmp_ti.tracking.tracks import Tracks
 
 TICK = 1e-3
 """[s]"""
@@ -58,6 +66,15 @@ class FutureModel:
     views: Views
     broken_premises: np.ndarray
     """[n, 2] returns in space that the model before had proven free [m]."""
+    hidden_ticks: device.Array = None
+    """[J, I] uint16 [ms], as `ticks`: when something hidden or not tracked could come, at the bound
+    of speed. What the next model remembers. `ticks` themselves in conservative mode."""
+    tracks: Tracks | None = None
+    """The movers that are tracked; None in conservative mode."""
+    chances: Chances | None = None
+    """How likely they, and hidden ones, touch the robot; None but in probabilistic mode."""
+    unexplained: np.ndarray = field(default_factory=lambda: np.zeros((0, 2)))
+    """[n, 2] returns that may move and belong to no track [m]; their cones are in `ticks`."""
     body: Body = field(init=False, repr=False)
     """The robot in arrays, for NumPy."""
     there: Body = field(init=False, repr=False)
@@ -68,14 +85,23 @@ class FutureModel:
     """What has been brought to the host already."""
     spans: device.Array = field(init=False, repr=False)
     """[F] uint32: least and greatest ticks over blocks of cells, see kernels/spans.py."""
+    risk_arrays: tuple[device.Array, ...] = field(init=False, repr=False)
+    """Arrival times of what is hidden, their spans, and `chances`, as kernels/risk.py reads them."""
 
     def __post_init__(self) -> None:
+        if self.hidden_ticks is None:
+            object.__setattr__(self, "hidden_ticks", self.ticks)
         body, there = bodies(self.robot, self.settings, device.resident())
         object.__setattr__(self, "body", body)
         object.__setattr__(self, "there", there)
         counts = device.put(body.placed(self.window.corner, self.window.size))
         object.__setattr__(self, "counts", counts)
         object.__setattr__(self, "spans", spans_of(self.ticks, counts, self.window.size))
+        arrays = (self.ticks, self.spans, *no_chances(device.resident()))
+        if self.chances is not None:
+            hidden_spans = spans_of(self.hidden_ticks, counts, self.window.size)
+            arrays = (self.hidden_ticks, hidden_spans, *self.chances.arrays)
+        object.__setattr__(self, "risk_arrays", arrays)
 
     @classmethod
     def from_scan(
@@ -126,18 +152,46 @@ class FutureModel:
             window.inner_radius - math.hypot(s.pose[0] - position[0], s.pose[1] - position[1])
             for s in scans
         ]
+        labels = labels_of(scans, settings, window.anchor, reach_of, static_map)
+        tracks = _followed(labels, window, previous, settings, stamp) if settings.tracks else None
         views = views_of(
-            scans,
+            labels,
             _empty_discs(robot, settings, position, window, previous is None),
             settings,
             window.anchor,
-            reach_of,
             static_map,
+            None if tracks is None else [owner >= 0 for owner in tracks.owner],
         )
         seen, marks = rasterised(views, window, settings)
         base = math.floor(stamp / TICK + 1e-6)
-        ticks, marks, broken = arrival(views, seen, marks, window, base, robot, settings, previous)
-        return cls(robot, settings, window, stamp, base, ticks, seen, marks, views, broken)
+        # memory has no cones for movers that were tracked: one that is lost may be anywhere
+        memory = None if tracks is not None and tracks.ended else previous
+        hidden, marks, broken = arrival(views, seen, marks, window, base, robot, settings, memory)
+        if tracks is None:
+            return cls(robot, settings, window, stamp, base, hidden, seen, marks, views, broken)
+        forecast = tracks.forecast(layer_times(settings, robot, stamp))
+        tubes = NO_TUBES[:0]
+        if settings.mode == "hybrid":
+            tubes = tubes_of(tracks, forecast, robot, settings, window, base * TICK)
+        unexplained = np.concatenate(
+            [
+                views.points(v, window.anchor)[(labels.met[v] == MOVABLE) & (owner < 0)]
+                for v, owner in enumerate(tracks.owner)
+            ]
+        )
+        ticks = overlaid(
+            hidden, tubes, unexplained, window, base * TICK, stamp, robot, settings
+        )
+        chances = None
+        if settings.mode == "probabilistic":
+            chances = chances_of(
+                forecast, robot, settings, position[:2], stamp, base, window.anchor,
+                emergence=settings.emergence, hidden_speeds=settings.hidden_speeds,
+            )  # fmt: skip
+        return cls(
+            robot, settings, window, stamp, base, ticks, seen, marks, views, broken, hidden,
+            tracks, chances, unexplained,
+        )  # fmt: skip
 
     @property
     def origin(self) -> tuple[float, float]:
@@ -234,20 +288,82 @@ class FutureModel:
         owner = "FutureModel.passively_safe"
         states = self.robot.check_states(owner, states)
         ticks = self._checked_ticks(owner, times, len(states))
+        return self._proved_on(self.ticks, self.spans, states, ticks)
+
+    def _proved_on(
+        self, arrival: device.Array, spans: device.Array, states: np.ndarray, ticks: np.ndarray
+    ) -> np.ndarray:
+        """[n] index of the braking control that stays clear of an arrival map; -1: none."""
         proof = np.zeros(len(states), dtype=np.int32)
         if len(states):
             check_states(
-                self.there.kind,
-                self.ticks,
-                self.spans,
-                self.there.numbers,
-                self.counts,
-                self.there.braking,
-                to_poses(states, self.window.anchor),
-                ticks,
-                proof,
-            )
+                self.there.kind, arrival, spans, self.there.numbers, self.counts,
+                self.there.braking, to_poses(states, self.window.anchor), ticks, proof,
+            )  # fmt: skip
         return proof - 1
+
+    def collision_probability(self, states: np.ndarray, times: np.ndarray) -> np.ndarray:
+        """P_ICS: the chance that something touches the robot although it brakes at once.
+
+        The least over the braking set (eq. 11) of the chance that anything does at any time until
+        rest (eq. 12; `Settings.risk` "paper": as printed). Bounded from above, see docs/risk.md.
+
+        Args:
+            states: [n, 5] within the robot's limits.
+            times: [n] absolute [s], none before `stamp`.
+
+        Returns:
+            [n] float in [0, 1].
+
+        Raises:
+            ValueError: a model of another mode, wrong shapes, states beyond the robot's limits,
+                times before `stamp`.
+        """
+        owner = "FutureModel.collision_probability"
+        if self.chances is None:
+            raise ValueError(
+                f"{owner} needs chances, and this model was made with Settings.mode ="
+                f' "{self.settings.mode}"; make it with mode="probabilistic"'
+            )
+        states = self.robot.check_states(owner, states)
+        ticks = self._checked_ticks(owner, times, len(states))
+        chance = np.zeros(len(states), dtype=np.float32)
+        if not len(states):
+            return chance.astype(np.float64)
+        states_risk(
+            self.there.kind, self.settings.risk == "paper", *self.risk_arrays[:2],
+            self.there.numbers, self.counts, self.there.braking, *self.risk_arrays[2:],
+            to_poses(states, self.window.anchor), ticks, chance, np.zeros(len(states), np.int32),
+        )  # fmt: skip
+        if len(self.unexplained):
+            # what is seen and not tracked is there for sure, and as fast as may be
+            size = (self.window.size, self.window.size)
+            cones = capped(
+                device.full(size, NEVER, np.uint16), self.unexplained, self.window, self.robot,
+                self.settings,
+            )  # fmt: skip
+            spans = spans_of(cones, self.counts, self.window.size)
+            chance[self._proved_on(cones, spans, states, ticks) < 0] = 1.0
+        return np.minimum(chance, 1.0).astype(np.float64)
+
+    def motion_risk(self, states: np.ndarray, times: np.ndarray) -> float:
+        """Chance that something touches the robot while it moves along a path, bounded from above.
+
+        Of what `chances` tell; whether the path is clear of what is there for sure `touched` tells.
+
+        Args:
+            states: [n, 5], at most a sample of the risk apart.
+            times: [n] absolute [s], increasing.
+        """
+        assert self.chances is not None
+        touch = np.zeros(max(len(self.tracks or ()), 1), dtype=np.float32)
+        chance = np.zeros(3, dtype=np.float32)
+        path_risk(
+            self.there.kind, self.settings.risk == "paper", device.share(), self.hidden_ticks,
+            self.there.numbers, self.counts, *self.risk_arrays[2:],
+            to_poses(states, self.window.anchor), self.ticks_of(times), touch, chance,
+        )  # fmt: skip
+        return float(min(chance[2], 1.0))
 
     def touched(self, states: np.ndarray, times: np.ndarray) -> np.ndarray:
         """Along a path, asked at the look-ups of the check: could anything touch the robot?
@@ -271,15 +387,23 @@ class FutureModel:
     def layer(self, index: int) -> np.ndarray:
         """[J, I] bool: cells that could be occupied at any moment of layer `index`.
 
-        Layer l covers [base + l length, base + (l + 1) length), length = settings.layer_length.
+        Layer l covers [base + l length, base + (l + 1) length), length = settings.layer_length. In
+        probabilistic mode float32: the chance that anything touches a robot disc that stays
+        anywhere in the cell for all of the layer (eq. 15, any object, any moment).
         """
         index = door.whole("FutureModel", "layer", index, least=0)
+        if self.chances is not None:
+            begin = self.base + index * self.settings.layer_length
+            return self.chances.layer(
+                self.window, self.hidden_ticks, max(begin, self.stamp),
+                begin + self.settings.layer_length,
+            )  # fmt: skip
         end = math.ceil((index + 1) * self.settings.layer_length / TICK - 1e-6)
         ticks = self._on_host("ticks")
         return (ticks < end) & (ticks != NEVER)
 
     def layers(self, count: int | None = None) -> np.ndarray:
-        """[L, J, I] bool, the time-layered occupancy grid.
+        """[L, J, I] bool, the time-layered occupancy grid; chances in probabilistic mode.
 
         Args:
             count: how many layers; None: until twice the cycle and the longest braking after the
@@ -341,6 +465,41 @@ def _window_for(
         size = size_for(furthest, settings.cell)
     anchor = previous.window.anchor if previous is not None else None
     return Window.around(position[0], position[1], size, settings.cell, anchor)
+
+
+def _followed(
+    labels: Labels,
+    window: Window,
+    previous: FutureModel | None,
+    settings: Settings,
+    stamp: float,
+) -> Tracks:
+    """The tracks of the model before, carried on by what the scans saw."""
+    try:
+        # filterpy and SciPy take longer to load than the rest of the planner
+        from passpmp_ti.tracking.pursuit import follow
+        from passpmp_ti.tracking.sighting import Sighting
+    except ImportError as missing:
+        raise ValueError(
+            f'Settings.mode = "{settings.mode}" needs tracks, and {missing.name} is not installed:'
+            f' pip install {missing.name}, or take mode="conservative"'
+        ) from missing
+    seen = []
+    for v, scan in enumerate(labels.scans):
+        bearing = scan.pose[2] + scan.angle_min
+        seen.append(
+            Sighting(
+                origin=scan.pose[:2],
+                bearings=bearing + scan.angle_increment * np.arange(len(scan.ranges)),
+                ranges=labels.ranges[v].astype(np.float64),
+                movable=labels.met[v] == MOVABLE,
+                lost=labels.met[v] == LOST,
+                increment=scan.angle_increment,
+                closed=labels.closed[v],
+                range_max=float(labels.view[v, 5]),
+            )
+        )
+    return follow(None if previous is None else previous.tracks, seen, stamp, settings)
 
 
 def _empty_discs(

@@ -37,53 +37,118 @@ class Views:
     """[V, n] int32: what the wedge's far side lets through."""
     scans: int
 
-    def returns(self, anchor: tuple[float, float]) -> np.ndarray:
-        """[m, 2] world positions of every return [m]."""
-        found = []
+    def points(self, v: int, anchor: tuple[float, float]) -> np.ndarray:
+        """[n, 2] world positions where the beams of scan `v` end [m]."""
+        n = self.beams[v]
+        bearing = self.view[v, 2] + self.view[v, 3] * np.arange(n)
+        r = self.ranges[v, :n]
+        return np.stack(
+            [
+                anchor[0] + self.view[v, 0] + r * np.cos(bearing),
+                anchor[1] + self.view[v, 1] + r * np.sin(bearing),
+            ],
+            axis=1,
+        )
+
+    def untracked(self, anchor: tuple[float, float]) -> np.ndarray:
+        """[m, 2] world positions of every return but those of tracked movers [m]."""
+        found = [np.zeros((0, 2))]
         for v in range(self.scans):
-            n = self.beams[v]
-            hit = self.met[v, :n] > wedges.NOTHING
-            bearing = self.view[v, 2] + self.view[v, 3] * np.flatnonzero(hit)
-            r = self.ranges[v, :n][hit]
-            found.append(
-                np.stack(
-                    [
-                        anchor[0] + self.view[v, 0] + r * np.cos(bearing),
-                        anchor[1] + self.view[v, 1] + r * np.sin(bearing),
-                    ],
-                    axis=1,
-                )
-            )
-        return np.concatenate(found) if found else np.zeros((0, 2))
+            met = self.met[v, : self.beams[v]]
+            hit = (met > wedges.NOTHING) & (met != wedges.TRACKED)
+            found.append(self.points(v, anchor)[hit])
+        return np.concatenate(found)
 
 
-def views_of(
+@dataclass(frozen=True, slots=True)
+class Labels:
+    """What each beam of some scans met, before anything is concluded from it."""
+
+    scans: Sequence[Scan]
+    view: np.ndarray
+    """[V, 8] float32, see kernels/beams.py."""
+    ranges: Sequence[np.ndarray]
+    """For each scan [n] float32 [m]; what lies beyond the grid is cut off."""
+    met: Sequence[np.ndarray]
+    """For each scan [n] int32, see kernels/beams.py."""
+    closed: Sequence[bool]
+    """Whether the beams go all the way round."""
+    map_cells: np.ndarray
+    frame: np.ndarray
+    """The map's surfaces and their frame, as kernels/beams.py reads them."""
+
+
+def labels_of(
     scans: Sequence[Scan],
-    empty_discs: Sequence[tuple[float, float, float]],
     settings: Settings,
     anchor: tuple[float, float],
     reach_of: Sequence[float],
     static_map: StaticMap | None,
-) -> Views:
-    """Work out what the scans prove.
+) -> Labels:
+    """Tell what each beam met.
 
     Args:
         scans: of one instant.
-        empty_discs: (x, y, radius) of discs known to be empty then [m].
-        settings: object width, noise, map tolerance.
+        settings: object width, map tolerance.
         anchor: of the window [m].
         reach_of: for each scan, the range beyond which the grid holds nothing [m].
         static_map: declares surfaces that stay.
     """
+    view = np.zeros((len(scans), 8), dtype=np.float32)
+    ranges, met, closed = [], [], []
+    map_cells, frame = _map_arrays(static_map, settings.map_tolerance, anchor)
+    for v, scan in enumerate(scans):
+        limit = min(scan.range_max, reach_of[v])
+        closing = 2 * math.pi - (len(scan.ranges) - 1) * scan.angle_increment
+        closed.append(closing < 1.5 * scan.angle_increment)
+        x, y, theta = scan.pose
+        bearing = math.remainder(theta + scan.angle_min, 2 * math.pi)
+        view[v, :6] = (
+            x - anchor[0], y - anchor[1], bearing, scan.angle_increment, closing, limit,
+        )  # fmt: skip
+        r = np.where(scan.lost, 0.0, np.minimum(scan.ranges, limit)).astype(np.float32)
+        labels = np.where(scan.returned & (scan.ranges < limit), wedges.MOVABLE, wedges.NOTHING)
+        if scan.moving is not None:
+            labels[(labels == wedges.MOVABLE) & ~scan.moving] = wedges.STATIC
+        labels[scan.lost] = wedges.LOST
+        labels = labels.astype(np.int32)
+        if static_map is not None:
+            wedges.label_by_map(
+                r, view, v, int(closed[v]), settings.object_width, map_cells, frame, labels
+            )
+        ranges.append(r)
+        met.append(labels)
+    return Labels(scans, view, ranges, met, closed, map_cells, frame)
+
+
+def views_of(
+    labels: Labels,
+    empty_discs: Sequence[tuple[float, float, float]],
+    settings: Settings,
+    anchor: tuple[float, float],
+    static_map: StaticMap | None,
+    tracked: Sequence[np.ndarray] | None = None,
+) -> Views:
+    """Work out what the scans prove.
+
+    Args:
+        labels: what their beams met.
+        empty_discs: (x, y, radius) of discs known to be empty then [m].
+        settings: object width, noise, map tolerance.
+        anchor: of the window [m].
+        static_map: declares surfaces that stay.
+        tracked: for each scan [n] bool, returns of movers that are asked about by themselves.
+    """
+    scans = labels.scans
     count = len(scans) + len(empty_discs)
     longest = max([len(s.ranges) for s in scans] + [DISC_BEAMS])
     view = np.zeros((count, 8), dtype=np.float32)
+    view[: len(scans)] = labels.view
     beams = np.zeros(count, dtype=np.int32)
     ranges = np.zeros((count, longest), dtype=np.float32)
     met = np.zeros((count, longest), dtype=np.int32)
     reach = np.zeros((count, longest), dtype=np.float32)
     far_side = np.full((count, longest), wedges.OPEN, dtype=np.int32)
-    map_cells, frame = _map_arrays(static_map, settings.map_tolerance, anchor)
     by_map_width = 0.0
     if static_map is not None:
         # how far from a surface's true place a return may be that is taken for it
@@ -93,31 +158,17 @@ def views_of(
 
     for v, scan in enumerate(scans):
         n = len(scan.ranges)
-        limit = min(scan.range_max, reach_of[v])
-        closing = 2 * math.pi - (n - 1) * scan.angle_increment
-        closed = closing < 1.5 * scan.angle_increment
-        x, y, theta = scan.pose
-        bearing = math.remainder(theta + scan.angle_min, 2 * math.pi)
-        view[v, :6] = (
-            x - anchor[0], y - anchor[1], bearing, scan.angle_increment, closing, limit,
-        )  # fmt: skip
         beams[v] = n
-        r = np.where(scan.lost, 0.0, np.minimum(scan.ranges, limit)).astype(np.float32)
-        labels = np.where(scan.returned & (scan.ranges < limit), wedges.MOVABLE, wedges.NOTHING)
-        if scan.moving is not None:
-            labels[(labels == wedges.MOVABLE) & ~scan.moving] = wedges.STATIC
-        labels[scan.lost] = wedges.LOST
-        labels = labels.astype(np.int32)
-        if static_map is not None:
-            wedges.label_by_map(
-                r, view, v, int(closed), settings.object_width, map_cells, frame, labels
-            )
+        own = labels.met[v]
+        if tracked is not None:
+            own = np.where((own == wedges.MOVABLE) & tracked[v], wedges.TRACKED, own)
+            own = own.astype(np.int32)
         wedges.prove_wedges(
-            r, labels, view, v, int(closed), settings.object_width, by_map_width,
-            settings.range_noise, map_cells, frame, reach, far_side,
+            labels.ranges[v], own, view, v, int(labels.closed[v]), settings.object_width,
+            by_map_width, settings.range_noise, labels.map_cells, labels.frame, reach, far_side,
         )  # fmt: skip
-        ranges[v, :n] = r
-        met[v, :n] = labels
+        ranges[v, :n] = labels.ranges[v]
+        met[v, :n] = own
     for v, (x, y, radius) in enumerate(empty_discs, start=len(scans)):
         step = 2 * math.pi / DISC_BEAMS
         view[v, :6] = (x - anchor[0], y - anchor[1], 0.0, step, step, radius)

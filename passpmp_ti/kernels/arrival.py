@@ -20,6 +20,12 @@ LANES = 16
 """Cells of a row that are worked on together; vectors of them become the CPU's own."""
 CHUNK = 8
 """Rows that are passed over together where none of them is near enough to matter."""
+RUNS, TILES = 8, 256
+"""Chunks of whole rows, and blocks of them, that one thread is handed at a time."""
+NONE, SOME, ALL = range(3)
+"""Of a block's cells are marked."""
+ALL_MARKED = -1
+"""As the least square of a chunk's block: all of its cells are marked."""
 FAR = 1 << 14
 """[cells] farther than any window is wide; its square and another's still fit an i32."""
 NO_SEED = 1e6
@@ -71,39 +77,86 @@ def square_along_row(
     marks: ti.template(),
     left: ti.template(),
     squares: ti.template(),
+    least: ti.template(),
     kind,
-    j,
-    blocks,
+    chunk,
+    row,
     border,
 ):
-    """Squared distance to the nearest mark of the same row, less the border of both cells."""
-    ramp = vec(0)
-    for lane in ti.static(range(LANES)):
-        ramp[lane] = lane + 1
+    """Squared distance to the nearest mark of the same row, less the border of both cells.
+
+    The least of a chunk's rows is kept too; they have to come in order. Most blocks are marked
+    nowhere: how far their ends are from a mark tells all of them.
+    """
+    blocks = least.shape[2]
+    j = chunk * CHUNK + row
+    first = (kind * least.shape[1] + chunk) * blocks * CHUNK + row
     away = FAR
-    row = (kind * seen.shape[0] + j) * blocks
     for b in range(blocks):
         cells = unmarked(seen, marks, left, kind, j, b * LANES)
-        steps = away + ramp
-        if cells.min() == 0:
+        holds = NONE
+        last = LANES - 1
+        if cells.max() == 0:
+            holds = ALL
+        elif cells.min() == 0:
+            holds = SOME
             for lane in ti.static(range(LANES)):
-                away = ti.select(cells[lane] == 0, 0, away + 1)
-                steps[lane] = away
-        away = ti.min(steps[LANES - 1], FAR)
-        squares[row + b] = ti.min(steps, FAR)
+                last = ti.select(cells[lane] == 0, lane, last)
+        # for the way back: how far the last mark before the block is, and what the block holds
+        at = first + b * CHUNK
+        squares[at][0] = away
+        squares[at][1] = holds
+        away = ti.select(holds == NONE, ti.min(away + LANES, FAR), LANES - 1 - last)
     away = FAR
     for back in range(blocks):
-        at = row + blocks - 1 - back
-        ahead = squares[at]
-        steps = away + (LANES + 1) - ramp
-        if ahead.min() == 0:
+        b = blocks - 1 - back
+        at = first + b * CHUNK
+        before = squares[at][0]
+        holds = squares[at][1]
+        steps = vec(0)
+        if holds == ALL:
+            away = 0
+        elif holds == SOME:
+            cells = unmarked(seen, marks, left, kind, j, b * LANES)
+            for lane in ti.static(range(LANES)):
+                before = ti.select(cells[lane] == 0, 0, before + 1)
+                steps[lane] = before
             for back_lane in ti.static(range(LANES)):
                 lane = ti.static(LANES - 1 - back_lane)
-                away = ti.select(ahead[lane] == 0, 0, away + 1)
-                steps[lane] = away
-        away = ti.min(steps[0], FAR)
-        apart = ti.max(ti.min(steps, ahead) - border, 0)
+                away = ti.select(cells[lane] == 0, 0, away + 1)
+                steps[lane] = ti.min(steps[lane], away)
+        else:
+            for lane in ti.static(range(LANES)):
+                steps[lane] = ti.min(before + 1 + lane, away + LANES - lane)
+            away += LANES
+        away = ti.min(away, FAR)
+        apart = ti.max(ti.min(steps, FAR) - border, 0)
         squares[at] = apart * apart
+        low = ti.select(holds == ALL, ALL_MARKED, apart.min() ** 2)
+        if row > 0:
+            before_it = least[kind, chunk, b]
+            low = ti.select(low == before_it, low, ti.max(ti.min(low, before_it), 0))
+        least[kind, chunk, b] = low
+
+
+@ti.func
+def free_of_unseen(least: ti.template(), chunk, b, border, unseen_square):
+    """1: all cells of a chunk's block are farther than that from what is unseen; 0: all of them
+    are unseen; -1: look closer."""
+    verdict = 1
+    step = 0
+    gap = 0
+    while verdict == 1 and gap <= unseen_square:
+        for way in ti.static(range(2)):
+            other = chunk + (2 * way - 1) * step
+            if other >= 0 and other < least.shape[1]:
+                if least[UNSEEN, other, b] + gap <= unseen_square:
+                    verdict = -1
+        step += 1
+        gap = ti.max((step - 1) * CHUNK + 1 - border, 0) ** 2
+    if least[UNSEEN, chunk, b] == ALL_MARKED:
+        verdict = 0
+    return verdict
 
 
 @ti.func
@@ -129,10 +182,10 @@ def nearest(squares: ti.template(), least: ti.template(), kind: ti.template(), j
                 going = True
                 if least[kind, chunk, b] + gap < worst:
                     # unrolled: only then do lanes become the CPU's own vectors
-                    first = (kind * least.shape[1] + chunk) * CHUNK * blocks + b
+                    first = ((kind * least.shape[1] + chunk) * blocks + b) * CHUNK
                     for row in ti.static(range(CHUNK)):
                         apart = ti.max(ti.abs(chunk * CHUNK + row - j) - border, 0)
-                        best = ti.min(best, squares[first + row * blocks] + apart * apart)
+                        best = ti.min(best, squares[first + row] + apart * apart)
                     worst = best.max()
         step += 1
     return best
@@ -183,9 +236,10 @@ def arrival_times(
     speed: ti.f32,
     blind_speed: ti.f32,
     stamp_error: ti.f32,
+    share: ti.i32,  # indices of a loop that one thread is handed at a time
     # scratch
-    squares: ti.types.ndarray(dtype=vec, ndim=1),  # [KINDS x J x I / LANES]
-    least: ti.types.ndarray(dtype=ti.i32, ndim=3),  # [KINDS, J / CHUNK, I / LANES]
+    squares: ti.types.ndarray(dtype=vec, ndim=1),  # [KINDS x J / CHUNK x I / LANES x CHUNK]
+    least: ti.types.ndarray(dtype=ti.i32, ndim=3),  # [KINDS, J / CHUNK, I / LANES] or ALL_MARKED
     # out
     arrival: Arrival,
 ):
@@ -196,38 +250,43 @@ def arrival_times(
     rows = arrival.shape[0]
     blocks = arrival.shape[1] // LANES
     chunks = rows // CHUNK
-    for task in range(KINDS * rows):
-        kind = task % KINDS
-        if is_wanted(kind, opened, blind_speed):
-            square_along_row(seen, marks, left, squares, kind, task // KINDS, blocks, border)
-    for task in range(KINDS * chunks * blocks):
-        kind = task // (chunks * blocks)
-        if is_wanted(kind, opened, blind_speed):
-            chunk = task // blocks % chunks
-            b = task % blocks
-            first = (kind * chunks + chunk) * CHUNK * blocks + b
-            low = squares[first]
-            for row in ti.static(range(1, CHUNK)):
-                low = ti.min(low, squares[first + row * blocks])
-            least[kind, chunk, b] = low.min()
+    grain = (share + RUNS - 1) // RUNS
+    for index in range(KINDS * chunks * grain):
+        task = index // grain
+        if index % grain == 0 and is_wanted(task % KINDS, opened, blind_speed):
+            for row in range(CHUNK):
+                square_along_row(
+                    seen, marks, left, squares, least, task % KINDS, task // KINDS, row, border
+                )
 
     # Distances are between cells, any point of either. A source's samples are an eighth of a cell
     # apart, so where another view takes over, what comes out may do so an eighth of a cell from
     # the last mark, and another eighth is forgiven behind a standing surface.
     taken = 1e-3 * cell + SLACK + SAMPLING * cell + clearance
     # down the columns: most of what one piece of work read is what the next one reads
-    for task in range(chunks * blocks):
-        b = evens_first(task // chunks, blocks)
-        for row in range(CHUNK):
-            j = task % chunks * CHUNK + row
+    grain = (share + TILES - 1) // TILES
+    for index in range(chunks * blocks * grain):
+        chunk = index // grain % chunks
+        b = evens_first(index // grain // chunks, blocks)
+        verdict = -1
+        own = 0
+        if index % grain == 0:
+            own = CHUNK
+            verdict = free_of_unseen(least, chunk, b, border, unseen_square)
+        for row in range(own):
+            j = chunk * CHUNK + row
             most = vec(unseen_square + 1)
             ticks = vec(0)
             come = vec(0)
             for kind in range(KINDS):
                 if most.max() > 0 and is_wanted(kind, opened, blind_speed):
-                    square = nearest(squares, least, kind, j, b, border, most)
+                    square = vec(0)
+                    if kind != UNSEEN or verdict < 0:
+                        square = nearest(squares, least, kind, j, b, border, most)
                     if kind == UNSEEN:
                         free = square > unseen_square
+                        if verdict > 0:
+                            free = vec(1)
                         most = ti.select(free, FAR * FAR, 0)
                         ticks = ti.select(free, NEVER, 0)
                     else:

@@ -9,6 +9,8 @@ before the nearer of its two returns, unless
 
 A wedge whose far side is one surface that stays (both returns static and no farther apart than
 the narrowest object, or the map knows the wall between them) lets nothing through. All others do.
+Neither does one whose returns are of movers that are tracked: behind them is their own body, which
+is asked about by itself (grid/tubes.py, grid/chances.py).
 Somebody who leans on a mapped wall may have one return that is taken for it. Another beam would
 meet him farther from the wall, unless the wedge is nearly as wide as he is: such a wedge the map
 does not shut.
@@ -22,7 +24,7 @@ import taichi as ti
 
 from passpmp_ti.kernels.launch import kernel
 
-LOST, NOTHING, MOVABLE, STATIC, STATIC_BY_MAP = -1, 0, 1, 2, 3
+LOST, NOTHING, MOVABLE, TRACKED, STATIC, STATIC_BY_MAP = -1, 0, 1, 2, 3, 4
 """What a beam met."""
 DOUBTED = -4
 """On its way from STATIC_BY_MAP to MOVABLE: it makes no other return doubted in turn."""
@@ -192,7 +194,9 @@ def prove_wedges(
             proven = ti.max(limit * (1.0 - half - 0.5 * half * half) - noise - SLACK, 0.0)
             by_map = met[a] == STATIC_BY_MAP or met[b] == STATIC_BY_MAP
             narrow = not by_map or ti.max(ranges[a], ranges[b]) * angle <= by_map_width
-            if stays(met[a]) and stays(met[b]) and limit == far and narrow:
+            both_tracked = met[a] == TRACKED and met[b] == TRACKED
+            both_stay = stays(met[a]) and stays(met[b]) and narrow
+            if (both_stay or both_tracked) and limit == far:
                 xa = end_x(view, v, a, ranges[a])
                 ya = end_y(view, v, a, ranges[a])
                 dx = end_x(view, v, b, ranges[b]) - xa
@@ -201,7 +205,7 @@ def prove_wedges(
                 # the true gap may be wider than it looks by both ranges' noise
                 if gap + 2.0 * noise <= width:
                     side = SHUT
-                elif frame[5] > 0.5:
+                elif both_stay and frame[5] > 0.5:
                     # a wall at a grazing angle: the map must know it all the way, asked more
                     # densely than the narrowest door is wide on the map
                     side = SHUT

@@ -19,7 +19,7 @@ Costs = ti.types.ndarray(dtype=ti.f32, ndim=2)
 def plan_cost(leaf, link: ti.template(), cost: ti.template(), numbers: ti.template()):
     """f of eq. 5 for the plan that ends at `leaf`.
 
-    w_ps is 1 for every plan of the tree: all its nodes are proven p-safe (eq. 8).
+    Nodes that are not safe enough are not in the tree: w_ps is finite for every plan of it.
     """
     elapsed = ti.cast(link[leaf, TICK] - link[0, TICK], ti.f32) * numbers[TICK_LENGTH]
     distance = cost[leaf, 1]
@@ -29,7 +29,8 @@ def plan_cost(leaf, link: ti.template(), cost: ti.template(), numbers: ti.templa
         rest = ti.max(span - elapsed - cost[leaf, 4], 0.0)
         distance = (cost[leaf, 0] + cost[leaf, 2] + rest * cost[leaf, 3]) / span
         elapsed = span
-    return numbers[WEIGHT_DISTANCE] * distance + numbers[WEIGHT_TIME] * elapsed
+    spent = numbers[WEIGHT_DISTANCE] * distance + numbers[WEIGHT_TIME] * elapsed
+    return cost[leaf, 5] * spent
 
 
 @kernel
@@ -54,7 +55,7 @@ def cheapest(
     # in
     count: ti.i32,  # nodes in the tree
     link: Links,  # [>= count, 8]
-    cost: Costs,  # [>= count, 5]
+    cost: Costs,  # [>= count, 6]
     numbers: Numbers,  # [5]
     # out
     block_leaf: Counts,  # [ceil(count / BLOCK)]

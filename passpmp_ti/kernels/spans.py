@@ -66,6 +66,11 @@ def packed(least, greatest):
 
 
 @ti.func
+def least_of(both):
+    return both & ti.u32(65535)
+
+
+@ti.func
 def column_of_three(pooled: ti.template(), begin, wide, rows, row, column):
     """(least, greatest) of a block and those above and below; beyond the map nothing is free."""
     least = 0
@@ -85,7 +90,7 @@ def column_of_three(pooled: ti.template(), begin, wide, rows, row, column):
 @kernel
 def lay_spans(
     # in
-    arrival: ti.types.ndarray(dtype=ti.u16, ndim=2),  # [J, I]
+    arrival: ti.types.ndarray(dtype=ti.u16, ndim=2),  # [J, I], both even
     counts: Counts,
     share: ti.i32,  # indices of a loop that one thread is handed at a time
     # scratch
@@ -99,43 +104,47 @@ def lay_spans(
         tile = index // share
         j0 = (tile // across) * TILE
         i0 = (tile % across) * TILE
-        columns = blocks_along(counts[2], 0)
         # one of a tile's indices does all of its work
         end = ti.select(index % share == 0, ti.min(j0 + TILE, counts[3]), j0)
-        for row in range(j0 >> 1, (end + 1) >> 1):
-            for column in range(i0 >> 1, ti.min((i0 + TILE) >> 1, columns)):
-                least = 65535
-                greatest = 0
-                for dj in ti.static(range(2)):
-                    for di in ti.static(range(2)):
-                        # beyond the map nothing is ever free
-                        found = 0
-                        if 2 * row + dj < counts[3] and 2 * column + di < counts[2]:
-                            found = ti.cast(arrival[2 * row + dj, 2 * column + di], ti.i32)
-                        least = ti.min(least, found)
-                        greatest = ti.max(greatest, found)
-                pooled[counts[BEGIN] + row * columns + column] = packed(least, greatest)
+        # what is read of `counts` is read before the loops: each store could have changed it
+        columns = blocks_along(counts[2], 0)
+        columns_end = ti.min((i0 + TILE) >> 1, columns)
+        begin = counts[BEGIN]
+        for row in range(j0 >> 1, end >> 1):
+            for column in range(i0 >> 1, columns_end):
+                a = ti.cast(arrival[2 * row, 2 * column], ti.i32)
+                b = ti.cast(arrival[2 * row, 2 * column + 1], ti.i32)
+                c = ti.cast(arrival[2 * row + 1, 2 * column], ti.i32)
+                d = ti.cast(arrival[2 * row + 1, 2 * column + 1], ti.i32)
+                pooled[begin + row * columns + column] = packed(
+                    ti.min(a, b, c, d), ti.max(a, b, c, d)
+                )
         for level in range(1, LEVELS):
             wide = blocks_along(counts[2], level)
             below = blocks_along(counts[2], level - 1)
             below_rows = blocks_along(counts[3], level - 1)
+            begin_below = counts[BEGIN + level - 1]
+            begin = counts[BEGIN + level]
             shift = level + 1
             rows_end = ti.select(end > j0, blocks_along(end, level), 0)
             columns_end = ti.min((i0 + TILE) >> shift, wide)
             for row in range(j0 >> shift, rows_end):
                 for column in range(i0 >> shift, columns_end):
-                    least = 65535
-                    greatest = 0
-                    for dj in ti.static(range(2)):
-                        for di in ti.static(range(2)):
-                            j = 2 * row + dj
-                            i = 2 * column + di
-                            both = ti.u32(0)
-                            if j < below_rows and i < below:
-                                both = pooled[counts[BEGIN + level - 1] + j * below + i]
-                            least = ti.min(least, ti.cast(both & ti.u32(65535), ti.i32))
-                            greatest = ti.max(greatest, ti.cast(both >> ti.u32(16), ti.i32))
-                    pooled[counts[BEGIN + level] + row * wide + column] = packed(least, greatest)
+                    at = begin_below + 2 * row * below + 2 * column
+                    a = pooled[at]
+                    # beyond the map nothing is ever free
+                    b, c, d = ti.u32(0), ti.u32(0), ti.u32(0)
+                    on_map = 2 * column + 1 < below
+                    if on_map:
+                        b = pooled[at + 1]
+                    if 2 * row + 1 < below_rows:
+                        c = pooled[at + below]
+                        if on_map:
+                            d = pooled[at + below + 1]
+                    least = ti.min(least_of(a), least_of(b), least_of(c), least_of(d))
+                    # of whole words the greatest has the greatest upper half
+                    greatest = ti.max(a, b, c, d) >> ti.u32(16)
+                    pooled[begin + row * wide + column] = packed(least, greatest)
 
     rows_of_all = 0
     for level in ti.static(range(LEVELS)):

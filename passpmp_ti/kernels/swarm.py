@@ -264,7 +264,7 @@ def search(
     room: ti.i32,
     count: ti.i32,  # nodes, more than one
     link: Links,  # [>= count, 8]
-    cost: Costs,  # [>= count, 5]
+    cost: Costs,  # [>= count, 6]
     numbers: Numbers,  # [8]
     # scratch
     keys: Links,  # [>= (P + S) * slots, 2]

@@ -5,8 +5,11 @@ Nodes are rows of flat arrays, parents before children, siblings side by side.
     pose [cap, 7] f32: see kernels/motion.py
     link [cap, 8] i32: 0 parent, 1 control, 2 steps of the primitive, 3 tick, 4 braking control
         that proves the node, 5 first child, 6 number of children, 7 what the node is
-    cost [cap, 5] f32: 0 integral of the guide along the plan to the node, 1 guide at the node,
-        2 integral along the braking that proves the node, 3 guide at its end, 4 its duration [s]
+    cost [cap, 6] f32: 0 integral of the guide along the plan to the node, 1 guide at the node,
+        2 integral along the braking that proves the node, 3 guide at its end, 4 its duration [s],
+        5 w_ps of the plan that ends here (eqs. 8 and 9): 1 where no risk is taken
+    risk [cap, 2] f32, where risk is weighed: what the motion to the node carries on, see
+        kernels/risk.py
 
 A level of few gaits for its nodes is grown along roads (kernels/roads.py), any other one by
 integrating from each node.
@@ -48,6 +51,8 @@ from passpmp_ti.kernels.motion import (
 )
 from passpmp_ti.kernels.spans import Spans
 
+CHECK, PLACE, BOTH = 1, 2, 3
+"""Parts of the growth of a chunk: which children are safe, and where in the tree they go."""
 GROWN, BRAKED = 0, 1
 """What a node is: the end of a primitive, or the rest that a braking trajectory leads to."""
 
@@ -167,6 +172,7 @@ def grow_level(
     by_roads: ti.template(),  # whether `roads` hold the ways of the parents' gaits
     share: ti.template(),  # indices that one thread is handed at a time, see device.share
     grain: ti.template(),  # children that one thread checks in one go
+    part: ti.template(),  # CHECK, PLACE, or BOTH: between them risks are weighed (kernels/weighing)
     arrival: Arrival,  # [J, I]
     spans: Spans,  # [F]
     guide: ti.types.ndarray(dtype=ti.f32, ndim=2),
@@ -188,8 +194,9 @@ def grow_level(
     link: Links,
     cost: Table,
     gait: Counts,  # [cap], of parents and children where `by_roads`
+    risk: Table,  # [cap, 2], of parents and children where `weighed`
     # scratch
-    child: Table,  # [M, 9] pose, integral of the guide, guide at the end
+    child: Table,  # [M, 12] pose, integral of the guide, guide at the end, risk carried on, w_ps
     child_proof: Counts,  # [M]: 1 + braking control, 0: not safe
     block: Counts,  # [blocks + 1] slots that blocks of parents take, then where they begin
     # out
@@ -199,150 +206,157 @@ def grow_level(
     capacity = pose.shape[0]
     blocks = ti.min(block.shape[0] - 1, 1 + (last - first) // FEW)
     children = (last - first) * per_parent
-    for index in range((children + grain - 1) // grain * share):
-        if index % share == 0:
-            begin = index // share * grain
-            for m in range(begin, ti.min(begin + grain, children)):
-                parent = first + m // per_parent
-                proof = 0
-                if ti.static(by_roads):
-                    if link[parent, WHAT] == GROWN:
+    if ti.static(part != PLACE):
+        for index in range((children + grain - 1) // grain * share):
+            if index % share == 0:
+                begin = index // share * grain
+                for m in range(begin, ti.min(begin + grain, children)):
+                    parent = first + m // per_parent
+                    proof = 0
+                    if ti.static(by_roads):
+                        if link[parent, WHAT] == GROWN:
+                            tick = link[parent, TICK]
+                            road = gait[parent] * per_parent + m % per_parent
+                            x, y = pose[parent, X], pose[parent, Y]
+                            c, s = pose[parent, C], pose[parent, S]
+                            if road_clear(
+                                arrival, spans, numbers, counts, roads, rows, road, x, y, c, s, tick
+                            ):
+                                q = placed(rows, roads[road, 0] + steps, x, y, c, s)
+                                proof = proving_road(
+                                    arrival, spans, numbers, counts, roads, rows,
+                                    number * per_parent + roads[road, 4] * counts[6],
+                                    q[X], q[Y], q[C], q[S], tick + steps * counts[4],
+                                )  # fmt: skip
+                    elif link[parent, WHAT] == GROWN:
+                        robot = robot_of(numbers)
                         tick = link[parent, TICK]
-                        road = gait[parent] * per_parent + m % per_parent
-                        x, y = pose[parent, X], pose[parent, Y]
-                        c, s = pose[parent, C], pose[parent, S]
-                        if road_clear(
-                            arrival, spans, numbers, counts, roads, rows, road, x, y, c, s, tick
-                        ):
-                            q = placed(rows, roads[road, 0] + steps, x, y, c, s)
-                            proof = proving_road(
-                                arrival, spans, numbers, counts, roads, rows,
-                                number * per_parent + roads[road, 4] * counts[6],
-                                q[X], q[Y], q[C], q[S], tick + steps * counts[4],
-                            )  # fmt: skip
-                elif link[parent, WHAT] == GROWN:
-                    robot = robot_of(numbers)
-                    tick = link[parent, TICK]
-                    clear, q, spent, there = driven_clear(
-                        kind, arrival, spans, guide, ahead, guide_frame, numbers, counts, robot,
-                        pose_of(pose, parent), tick,
-                        control_of(controls, m % per_parent), steps,
-                    )  # fmt: skip
-                    if clear:
-                        proof = proving_brake(
-                            kind, arrival, spans, numbers, counts, braking, robot, q,
-                            tick + steps * counts[4],
+                        clear, q, spent, there = driven_clear(
+                            kind, arrival, spans, guide, ahead, guide_frame, numbers, counts, robot,
+                            pose_of(pose, parent), tick,
+                            control_of(controls, m % per_parent), steps,
                         )  # fmt: skip
-                    if proof > 0:
-                        store_pose(child, m, q)
-                        child[m, 7] = cost[parent, 0] + spent
-                        child[m, 8] = there
-                child_proof[m] = proof
+                        if clear:
+                            proof = proving_brake(
+                                kind, arrival, spans, numbers, counts, braking, robot, q,
+                                tick + steps * counts[4],
+                            )  # fmt: skip
+                        if proof > 0:
+                            store_pose(child, m, q)
+                            child[m, 7] = cost[parent, 0] + spent
+                            child[m, 8] = there
+                    child_proof[m] = proof
 
-    # Slots go by the order of nodes, whoever counts them: the same tree on every run.
-    for index in range(blocks * share):
-        if index % share == 0:
-            b = index // share
-            end = block_begin(b + 1, blocks, first, last)
-            taken = 0
-            for parent in range(block_begin(b, blocks, first, last), end):
-                taken += ti.abs(room_for(kind, pose, link, child_proof, parent, first, per_parent))
-            block[b] = taken
-    ti.loop_config(serialize=True)
-    for _ in range(1):
-        begin = slot
-        for b in range(blocks):
-            taken = block[b]
-            block[b] = begin
-            begin += taken
-        block[blocks] = begin
-        grown[0] = begin
-        grown[1] = 0
-        if begin > capacity:
-            # from the first parent that does not fit, none does
-            b = blocks - 1
-            while block[b] > capacity:
-                b -= 1
-            end = block[b]
-            parent = block_begin(b, blocks, first, last)
-            full = False
-            while not full:
-                room = ti.abs(room_for(kind, pose, link, child_proof, parent, first, per_parent))
-                if end + room > capacity:
-                    full = True
-                else:
-                    end += room
-                    parent += 1
-            grown[0] = end
-            grown[1] = last - parent
+    if ti.static(part != CHECK):
+        # Slots go by the order of nodes, whoever counts them: the same tree on every run.
+        for index in range(blocks * share):
+            if index % share == 0:
+                b = index // share
+                end = block_begin(b + 1, blocks, first, last)
+                taken = 0
+                for parent in range(block_begin(b, blocks, first, last), end):
+                    taken += ti.abs(room_for(kind, pose, link, child_proof, parent, first, per_parent))
+                block[b] = taken
+        ti.loop_config(serialize=True)
+        for _ in range(1):
+            begin = slot
+            for b in range(blocks):
+                taken = block[b]
+                block[b] = begin
+                begin += taken
+            block[blocks] = begin
+            grown[0] = begin
+            grown[1] = 0
+            if begin > capacity:
+                # from the first parent that does not fit, none does
+                b = blocks - 1
+                while block[b] > capacity:
+                    b -= 1
+                end = block[b]
+                parent = block_begin(b, blocks, first, last)
+                full = False
+                while not full:
+                    room = ti.abs(room_for(kind, pose, link, child_proof, parent, first, per_parent))
+                    if end + room > capacity:
+                        full = True
+                    else:
+                        end += room
+                        parent += 1
+                grown[0] = end
+                grown[1] = last - parent
 
-    for index in range(blocks * share):
-        if index % share == 0:
-            b = index // share
-            slot_now = block[b]
-            end = block_begin(b + 1, blocks, first, last)
-            for parent in range(block_begin(b, blocks, first, last), end):
-                found = room_for(kind, pose, link, child_proof, parent, first, per_parent)
-                room = ti.abs(found)
-                fits = found != 0 and slot_now + room <= capacity
-                link[parent, FIRST] = -1
-                link[parent, CHILDREN] = 0
-                if fits:
-                    link[parent, FIRST] = slot_now
-                    link[parent, CHILDREN] = room
-                if fits and found > 0:
-                    at = slot_now
-                    for k in range(per_parent):
-                        m = (parent - first) * per_parent + k
-                        if child_proof[m] > 0:
-                            q = pose7(0.0)
-                            spent, there, after, at_rest_cost, seconds = 0.0, 0.0, 0.0, 0.0, 0.0
-                            if ti.static(by_roads):
-                                road = gait[parent] * per_parent + k
-                                start = pose_of(pose, parent)
-                                q = road_end(rows, roads, road, steps, start)
-                                spent, there = road_cost(
-                                    guide, ahead, guide_frame, numbers, roads, rows, road, steps,
-                                    SAMPLES, start, cost[parent, 1],
-                                )  # fmt: skip
-                                spent += cost[parent, 0]
-                                gait[at] = roads[road, 4]
-                                brake = number * per_parent + roads[road, 4] * counts[6]
-                                brake += child_proof[m] - 1
-                                seconds = roads[brake, 1] * numbers[1]
-                                after, at_rest_cost = road_cost(
-                                    guide, ahead, guide_frame, numbers, roads, rows, brake,
-                                    roads[brake, 1], BRAKING_SAMPLES, q, there,
-                                )  # fmt: skip
-                            else:
-                                q = pose_of(child, m)
-                                spent = child[m, 7]
-                                there = child[m, 8]
-                                after, at_rest_cost, seconds = braking_cost(
-                                    kind, guide, ahead, guide_frame, numbers, robot_of(numbers), q,
-                                    there, control_of(braking, child_proof[m] - 1),
-                                )  # fmt: skip
-                            store_pose(pose, at, q)
-                            link[at, PARENT] = parent
-                            link[at, CONTROL] = k
-                            link[at, STEPS] = steps
-                            link[at, TICK] = link[parent, TICK] + steps * counts[4]
-                            link[at, PROOF] = child_proof[m] - 1
-                            link[at, FIRST] = -1
-                            link[at, CHILDREN] = 0
-                            link[at, WHAT] = GROWN
-                            cost[at, 0] = spent
-                            cost[at, 1] = there
-                            cost[at, 2] = after
-                            cost[at, 3] = at_rest_cost
-                            cost[at, 4] = seconds
-                            at += 1
-                elif fits:
-                    store_braking(
-                        kind, guide, ahead, guide_frame, numbers, counts, braking, parent, slot_now,
-                        pose, link, cost,
-                    )  # fmt: skip
-                slot_now += room
+        for index in range(blocks * share):
+            if index % share == 0:
+                b = index // share
+                slot_now = block[b]
+                end = block_begin(b + 1, blocks, first, last)
+                for parent in range(block_begin(b, blocks, first, last), end):
+                    found = room_for(kind, pose, link, child_proof, parent, first, per_parent)
+                    room = ti.abs(found)
+                    fits = found != 0 and slot_now + room <= capacity
+                    link[parent, FIRST] = -1
+                    link[parent, CHILDREN] = 0
+                    if fits:
+                        link[parent, FIRST] = slot_now
+                        link[parent, CHILDREN] = room
+                    if fits and found > 0:
+                        at = slot_now
+                        for k in range(per_parent):
+                            m = (parent - first) * per_parent + k
+                            if child_proof[m] > 0:
+                                q = pose7(0.0)
+                                spent, there, after, at_rest_cost, seconds = 0.0, 0.0, 0.0, 0.0, 0.0
+                                if ti.static(by_roads):
+                                    road = gait[parent] * per_parent + k
+                                    start = pose_of(pose, parent)
+                                    q = road_end(rows, roads, road, steps, start)
+                                    spent, there = road_cost(
+                                        guide, ahead, guide_frame, numbers, roads, rows, road, steps,
+                                        SAMPLES, start, cost[parent, 1],
+                                    )  # fmt: skip
+                                    spent += cost[parent, 0]
+                                    gait[at] = roads[road, 4]
+                                    brake = number * per_parent + roads[road, 4] * counts[6]
+                                    brake += child_proof[m] - 1
+                                    seconds = roads[brake, 1] * numbers[1]
+                                    after, at_rest_cost = road_cost(
+                                        guide, ahead, guide_frame, numbers, roads, rows, brake,
+                                        roads[brake, 1], BRAKING_SAMPLES, q, there,
+                                    )  # fmt: skip
+                                else:
+                                    q = pose_of(child, m)
+                                    spent = child[m, 7]
+                                    there = child[m, 8]
+                                    after, at_rest_cost, seconds = braking_cost(
+                                        kind, guide, ahead, guide_frame, numbers, robot_of(numbers), q,
+                                        there, control_of(braking, child_proof[m] - 1),
+                                    )  # fmt: skip
+                                store_pose(pose, at, q)
+                                link[at, PARENT] = parent
+                                link[at, CONTROL] = k
+                                link[at, STEPS] = steps
+                                link[at, TICK] = link[parent, TICK] + steps * counts[4]
+                                link[at, PROOF] = child_proof[m] - 1
+                                link[at, FIRST] = -1
+                                link[at, CHILDREN] = 0
+                                link[at, WHAT] = GROWN
+                                cost[at, 0] = spent
+                                cost[at, 1] = there
+                                cost[at, 2] = after
+                                cost[at, 3] = at_rest_cost
+                                cost[at, 4] = seconds
+                                cost[at, 5] = 1.0
+                                if ti.static(part == PLACE):
+                                    risk[at, 0] = child[m, 9]
+                                    risk[at, 1] = child[m, 10]
+                                    cost[at, 5] = child[m, 11]
+                                at += 1
+                    elif fits:
+                        store_braking(
+                            kind, guide, ahead, guide_frame, numbers, counts, braking, parent, slot_now,
+                            pose, link, cost,
+                        )  # fmt: skip
+                    slot_now += room
 
 
 @ti.func
@@ -388,6 +402,7 @@ def store_braking(
     cost[at, 2] = 0.0
     cost[at, 3] = there
     cost[at, 4] = 0.0
+    cost[at, 5] = cost[parent, 5]  # the same motion as the parent's own plan
 
 
 @kernel
@@ -417,7 +432,7 @@ def plant(
     # in
     root_pose: Numbers,  # [7]
     root_link: Counts,  # [8]
-    root_cost: Numbers,  # [5]
+    root_cost: Numbers,  # [6]
     # out
     pose: Table,
     link: Links,
@@ -430,5 +445,5 @@ def plant(
             pose[0, r] = root_pose[r]
         for r in ti.static(range(8)):
             link[0, r] = root_link[r]
-        for r in ti.static(range(5)):
+        for r in ti.static(range(6)):
             cost[0, r] = root_cost[r]

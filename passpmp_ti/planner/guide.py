@@ -10,6 +10,7 @@ import numpy as np
 from passpmp_ti import device
 from passpmp_ti.grid.model import FutureModel
 from passpmp_ti.grid.static_map import StaticMap
+from passpmp_ti.grid.tubes import asked_speed
 from passpmp_ti.kernels.eikonal import block, lay_out, point_ahead
 from passpmp_ti.kernels.guide import guide_costs
 from passpmp_ti.planner.eikonal import distances_to_zeros, solve
@@ -160,8 +161,10 @@ class Guide:
         lost = settings.clearance(robot) + settings.cell
         cruise = self._cruise / cell
         gain, loss = 0.0, -cruise
-        if settings.object_speed > 0:
-            gain = robot.deceleration / settings.object_speed
+        # hidden movers that are faster are what a plan's risk pays for
+        faced = settings.object_speed * asked_speed(settings)
+        if faced > 0:
+            gain = robot.deceleration / faced
             loss = gain * lost / cell + robot.deceleration * 2 * settings.cycle / cell
         return np.array(
             [WALL_SHARE * cruise, SLOWEST_SHARE * cruise, cruise, gain, loss], dtype=np.float32

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -21,11 +22,13 @@ from passpmp_ti.planner.place import allowed_gap, carried_on, gap, stitched
 from passpmp_ti.planner.plan import (
     brake_at_once,
     braking_off,
+    calmest,
     still_clear,
     trajectory_to,
 )
 from passpmp_ti.planner.record import CycleRecord
 from passpmp_ti.planner.rehearsal import rehearse
+from passpmp_ti.planner.risk import risk_of, safety_weight
 from passpmp_ti.planner.swarm import Swarm, best_leaf
 from passpmp_ti.planner.tree import ROOT, Tree, TreeGrower
 from passpmp_ti.planner.vanished import BELIEVED_AT_LAST, Belief
@@ -143,7 +146,7 @@ class Navigator:
             # the last cycle's tree goes, and that takes time too
             self.record = record
             budget.close()
-            self.record = replace(record, timings=budget.timings, time_left=budget.left())
+            self.record = record.ended(budget.timings, budget.left())
         return self.held
 
     def _cycle(
@@ -197,6 +200,7 @@ class Navigator:
             root_proved=proof >= 0, fault=stray,
             held_clear=lost or still_clear(model, self.held, start),
             broken_premises=model.broken_premises, model=model,
+            held_risk=1.0 if lost else risk_of(model, self.held, start),
         )  # fmt: skip
         alarm = stray or self._alarm(record, lost, allowed)
         if alarm:
@@ -240,8 +244,9 @@ class Navigator:
             return f"turned {record.turn_deviation:.2f} rad off its plan"
         if len(record.broken_premises):
             return f"{len(record.broken_premises)} returns where nothing could be"
-        # what was laid anew was verified by memory that is gone: nothing since speaks against it
-        if not record.held_clear and not self._laid:
+        # What was laid anew was verified by memory that is gone: nothing since speaks against it.
+        # A track may always turn out differently: that is weighed with the plans.
+        if not record.held_clear and not self._laid and not self.settings.tracks:
             return "what is held is not clear any more"
         return ""
 
@@ -288,29 +293,37 @@ class Navigator:
         budget.lap("tree")
         budget.grown()
         leaf, particles, cost_new = self._choose(tree)
-        cost_held = trajectory_cost(self.held, start, guide, settings, self.robot)
+        weight = safety_weight(settings, record.held_risk, self.held.end - start)
+        if settings.tracks and not record.held_clear and not self._laid:
+            weight = math.inf
+        cost_held = math.inf
+        if math.isfinite(weight):
+            cost_held = trajectory_cost(self.held, start, guide, settings, self.robot) * weight
         budget.lap("choice")
         plan, reason = None, "no safe plan was found"
         if leaf != ROOT:
             reason = "the held plan is at least as good"
-            if cost_new < cost_held - max(TIE, TIE_SHARE * cost_held):
+            if math.isinf(cost_held) or cost_new < cost_held - max(TIE, TIE_SHARE * cost_held):
                 plan = trajectory_to(tree, leaf)
                 if not still_clear(model, plan):
                     plan, reason = None, "the new plan did not stand its second check"
+        calmed = plan is None and math.isinf(cost_held)
+        if calmed:
+            plan = calmest(model, self.held, root, start)
         chosen = self.held if plan is None else plan
-        delay = decision_time(model, chosen, record.stamp, start)
         if plan is not None and budget.late():
             plan, reason, chosen = None, "planning took longer than the deadline", self.held
-            delay = decision_time(model, chosen, record.stamp, start)
-        if plan is not None:
+        decision = "held" if plan is None or plan is self.held else "brake" if calmed else "new"
+        if plan is not None and plan is not self.held:
             self._hold(plan)
         budget.lap("bookkeeping")
         return replace(
-            record, decision="held" if plan is None else "new",
-            reason=reason if plan is None else "", tree=tree,
+            record, decision=decision, reason="" if decision == "new" else reason, tree=tree,
+            risk=risk_of(model, chosen, start),
             tree_nodes=tree.count, tree_depth=tree.depth, tree_stopped_by=tree.stopped_by,
             cost=cost_held if plan is None else cost_new, cost_new=cost_new, cost_held=cost_held,
-            plan_time=max(chosen.end - start, 0.0), decision_time=delay,
+            plan_time=max(chosen.end - start, 0.0),
+            decision_time=partial(decision_time, model, chosen, record.stamp, start),
             particle_leaves=particles, chosen=chosen,
         )  # fmt: skip
 

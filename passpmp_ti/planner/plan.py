@@ -7,6 +7,7 @@ import numpy as np
 from passpmp_ti.grid.body import to_poses, to_states
 from passpmp_ti.grid.model import FutureModel
 from passpmp_ti.kernels.tree import PROOF
+from passpmp_ti.planner.risk import risk_of
 from passpmp_ti.planner.tree import Tree, follow
 from passpmp_ti.trajectory import Trajectory
 
@@ -39,6 +40,23 @@ def brake_at_once(model: FutureModel, state: np.ndarray, start: float) -> Trajec
         for brake, taken in zip(brakes, touches, strict=True)
     ]
     return brakes[int(np.argmax(clear_until))]
+
+
+def calmest(
+    model: FutureModel, held: Trajectory, root: np.ndarray, start: float
+) -> Trajectory:
+    """Of what is held, and of braking from `root` [5] at `start` [s] by each control: what has the
+    least risk, and of equals what stays clear longest; the held one of those."""
+    state = model.robot.within_limits(root)
+    ways = [held] + [
+        braking_from(model, state, start, k) for k in range(len(model.body.braking))
+    ]
+    clear = []
+    for way in ways:
+        taken = _touched_since(model, way, start)
+        clear.append(float(way.times[np.argmax(taken)]) if taken.any() else np.inf)
+    risks = [risk_of(model, way, start) for way in ways]
+    return ways[min(range(len(ways)), key=lambda k: (risks[k], -clear[k], k))]
 
 
 def braking_off(model: FutureModel, road: Trajectory, start: float) -> Trajectory:

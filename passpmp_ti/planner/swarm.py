@@ -27,7 +27,7 @@ class Branches(Protocol):
 
     @property
     def cost(self) -> Array:
-        """[>= count, 5] float32, see there."""
+        """[>= count, 6] float32, see there."""
 
     @property
     def count(self) -> int:

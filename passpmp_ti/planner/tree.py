@@ -12,11 +12,14 @@ from passpmp_ti.grid.body import to_poses, to_states
 from passpmp_ti.grid.model import TICK, FutureModel
 from passpmp_ti.kernels.check import trace
 from passpmp_ti.kernels.tree import (
+    BOTH,
     BRAKED,
+    CHECK,
     CHILDREN,
     CONTROL,
     FIRST,
     PARENT,
+    PLACE,
     STEPS,
     WHAT,
     grow_level,
@@ -24,6 +27,7 @@ from passpmp_ti.kernels.tree import (
     trail,
 )
 from passpmp_ti.kernels.tree import TICK as TICK_COLUMN
+from passpmp_ti.kernels.weighing import begin_risk, multiply_weights, weigh_children
 from passpmp_ti.planner.guide import GuideField
 from passpmp_ti.planner.roads import Roads
 from passpmp_ti.robots import Robot
@@ -64,7 +68,7 @@ class Tree:
     link: device.Array
     """[n, 8] int32, see kernels/tree.py."""
     cost: device.Array
-    """[n, 5] float32: the guide along the plan, at the node, and along its braking; see there."""
+    """[n, 6] float32: the guide along the plan, at the node, and along its braking; see there."""
     root: np.ndarray
     """[7] float32 pose of the root."""
     count: int
@@ -203,7 +207,7 @@ def follow(model: FutureModel, pose: np.ndarray, parts: list[tuple[np.ndarray, i
 
 def tree_bytes(capacity: int) -> int:
     """What a tree of `capacity` nodes takes, and the gaits of its nodes [bytes]."""
-    return capacity * 4 * (7 + 8 + 5 + 1)
+    return capacity * 4 * (7 + 8 + 6 + 1)
 
 
 class TreeGrower:
@@ -235,7 +239,9 @@ class TreeGrower:
         self._blocks = DEVICE_BLOCKS if resident else BLOCKS
         self._least = DEVICE_LEAST if resident else LEAST
         self._grains = (1, 1) if resident else (GRAIN, ROADS_GRAIN)
-        self._child = device.empty((self._chunk * fan, 9), np.float32)
+        self._weighed = settings.mode == "probabilistic" and settings.risk == "any"
+        self._risk = device.empty((settings.capacity if self._weighed else 1, 2), np.float32)
+        self._child = device.empty((self._chunk * fan, 12), np.float32)
         self._child_proof = device.empty((self._chunk * fan,), np.int32)
         self._block = device.empty((self._blocks + 1,), np.int32)
         self._grown = device.empty((2,), np.int32)
@@ -267,12 +273,17 @@ class TreeGrower:
             settings.capacity,
             root_pose,
             np.array([NO_PARENT, 0, 0, model.ticks_of(start), proof, -1, 0, 0], dtype=np.int32),
-            np.array([0.0, here, 0.0, here, 0.0], dtype=np.float32),
+            np.array([0.0, here, 0.0, here, 0.0, 1.0], dtype=np.float32),
         )
         fixed = (
             model.ticks, model.spans, guide.time, guide.ahead, guide.frame, body.numbers,
             model.counts, body.braking, body.controls,
         )  # fmt: skip
+        if self._weighed:
+            begin_risk(
+                body.kind, body.numbers, model.counts, *model.risk_arrays[2:],
+                device.put(root_pose[None]), model.ticks_of(start), self._risk,
+            )  # fmt: skip
         roads = self._roads
         roads.clear()
         level_begin, count, depth, stopped_by = ROOT, 1, 0, "depth"
@@ -281,7 +292,9 @@ class TreeGrower:
             first, level_end, short = level_begin, count, 0
             # by the whole level before, however its chunks were: the choice is part of the tree
             likely = _parents_for(settings.capacity - count, fan)
-            by_roads = roads.lay(model, arrays[0], first, level_end, steps, likely)
+            by_roads = not self._weighed and roads.lay(
+                model, arrays[0], first, level_end, steps, likely
+            )
             while first < level_end and not short:
                 now = time.perf_counter()
                 # what will find no room need not be checked
@@ -293,11 +306,23 @@ class TreeGrower:
                         stopped_by = "time"
                         break
                 before = count
-                grow_level(
-                    body.kind, by_roads, device.share(), self._grains[by_roads], *fixed, first,
-                    first + parents, count, steps, roads.number, roads.links, roads.rows, *arrays,
-                    roads.gait, self._child, self._child_proof, self._block, self._grown,
+                chunk = (
+                    *fixed, first, first + parents, count, steps, roads.number, roads.links,
+                    roads.rows, *arrays, roads.gait, self._risk, self._child, self._child_proof,
+                    self._block, self._grown,
                 )  # fmt: skip
+                how = body.kind, by_roads, device.share(), self._grains[by_roads]
+                if self._weighed:
+                    grow_level(*how, CHECK, *chunk)
+                    weigh_children(
+                        body.kind, device.share(), model.ticks, model.spans, body.numbers,
+                        model.counts, body.braking, body.controls, *model.risk_arrays,
+                        settings.allowed_risk, settings.allowed_risk_rate, first, first + parents,
+                        steps, *arrays[:2], self._risk, self._child, self._child_proof,
+                    )  # fmt: skip
+                    grow_level(*how, PLACE, *chunk)
+                else:
+                    grow_level(*how, BOTH, *chunk)
                 count, short = (int(n) for n in device.host(self._grown))
                 fan = (count - before) / parents
                 first += parents
@@ -311,9 +336,24 @@ class TreeGrower:
             if stopped_by != "depth":
                 break
             level_begin = level_end
+        if settings.mode == "probabilistic" and settings.risk == "paper":
+            _weigh_as_printed(model, count, *arrays)
         if not device.resident():
             arrays = tuple(array[:count] for array in arrays)
         return Tree(model, *arrays, root_pose, count, start, depth, stopped_by)
+
+
+def _weigh_as_printed(
+    model: FutureModel, count: int, pose: device.Array, link: device.Array, cost: device.Array
+) -> None:
+    """w_ps of every plan by eqs. 9 to 17 as printed; nothing is pruned by it."""
+    poses, links = device.host(pose)[:count], device.host(link)[:count]
+    states = np.array(
+        [model.robot.within_limits(state) for state in to_states(poses, model.window.anchor)]
+    )
+    times = model.base + links[:, TICK_COLUMN] * TICK
+    chance = model.collision_probability(states, times).astype(np.float32)
+    multiply_weights(count, link, device.put(chance), cost)
 
 
 def _parents_for(room: int, fan: float) -> int:

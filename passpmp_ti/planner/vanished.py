@@ -8,7 +8,7 @@ import numpy as np
 
 from passpmp_ti import device
 from passpmp_ti.grid.model import FutureModel
-from passpmp_ti.kernels.vanished import squares_empty
+from passpmp_ti.kernels.vanished import count_surfaces, surfaces_gone
 
 FEWEST, LEAST_SHARE = 3, 0.05
 """Surfaces that must be gone before the scan is doubted, and their share of those asked about: a
@@ -54,7 +54,7 @@ class Belief:
 
 def surfaces(model: FutureModel) -> int:
     """How many cells hold a surface."""
-    return int(np.count_nonzero(model.static) + np.count_nonzero(model.movable))
+    return int(count_surfaces(device.put(model.marks)))
 
 
 def vanished(before: FutureModel, now: FutureModel, *, timeless: bool = False) -> str:
@@ -74,34 +74,15 @@ def vanished(before: FutureModel, now: FutureModel, *, timeless: bool = False) -
     age = now.stamp - before.stamp + settings.stamp_error
     # both scans may be off, and a surface is known to a cell only
     margin = 2 * (settings.range_noise + settings.localisation_error) + 2 * now.cell
-    asked = 0
-    squares = []
-    seen = now.seen
-    shift = now.window.cells_to(before.window)
-    for mask, speed in ((before.static, 0.0), (before.movable, settings.object_speed)):
+    reaches = []
+    for speed in (0.0, settings.object_speed):
         reach = math.ceil((speed * age + margin) / now.cell) + 1
-        if reach > MOST_REACH or (timeless and speed > 0):
-            continue
-        j, i = np.divmod(np.flatnonzero(mask), mask.shape[1])
-        i, j = i + shift[0], j + shift[1]
-        size = now.window.size
-        inside = (np.minimum(i, j) >= reach) & (np.maximum(i, j) < size - reach)
-        i, j = i[inside], j[inside]
-        asked += len(i)
-        passed = seen[j, i]  # most are not: that is quick to ask
-        if passed.any():
-            j, i = j[passed], i[passed]
-            squares.append(np.stack([j, i, np.full(len(i), reach)], axis=1))
-    gone = _empty(seen, np.concatenate(squares)) if squares else 0
+        skipped = reach > MOST_REACH or (timeless and speed > 0)
+        reaches.append(-1 if skipped else reach)
+    found = device.put(np.zeros(2, dtype=np.int32))
+    shift = now.window.cells_to(before.window)
+    surfaces_gone(device.put(before.marks), device.put(now.seen_cells), *shift, *reaches, found)
+    asked, gone = (int(n) for n in device.host(found))
     if gone >= FEWEST and gone >= LEAST_SHARE * asked:
         return f"{gone} of {asked} surfaces are gone that cannot be"
     return ""
-
-
-def _empty(seen: np.ndarray, squares: np.ndarray) -> int:
-    """How many squares [n, 3] (row, column, cells to each side) are seen whole."""
-    if len(squares) < FEWEST:
-        return 0  # too few to matter
-    empty = device.empty((len(squares),), np.int32)
-    squares_empty(device.put(seen.view(np.uint8)), device.put(squares.astype(np.int32)), empty)
-    return int(device.host(empty).sum())

@@ -29,7 +29,7 @@ def random_tree(nodes, generator, fans=(1, 5), spare=0):
     What is judged by the last state alone costs what [n, 1] says. `spare` rows of rubbish follow.
     """
     link = generator.integers(0, 2**31 - 1, (nodes + spare, 8), dtype=np.int32)
-    cost = np.full((nodes + spare, 5), -1e9, dtype=np.float32)
+    cost = np.full((nodes + spare, 6), -1e9, dtype=np.float32)
     link[:nodes] = 0
     link[0, PARENT] = -1
     value, depth = np.zeros(nodes), np.zeros(nodes, dtype=int)
@@ -46,6 +46,7 @@ def random_tree(nodes, generator, fans=(1, 5), spare=0):
             depth[child] = depth[parent] + 1
         count += fan
         parent += 1
-    cost[:nodes] = generator.uniform(0.0, 3.0, (nodes, 5))
+    cost[:nodes, :5] = generator.uniform(0.0, 3.0, (nodes, 5))
+    cost[:nodes, 5] = 1.0
     cost[:nodes, 1] = value - value.min() + 1
     return BareTree(link, cost, nodes, int(depth.max()))

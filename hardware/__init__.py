@@ -1,0 +1,1 @@
+"""What stands between the planner and a real robot. The planner never imports this."""
