@@ -232,6 +232,11 @@ def test_an_unknown_mode_is_refused_with_the_nearest(scenario, tmp_path, capsys)
     assert not out.exists()
 
 
+def test_workers_that_are_none_are_refused(scenario, tmp_path, capsys):
+    assert main(["compare", scenario, "--workers", "0", "--out", str(tmp_path)]) == BAD_INPUT
+    assert "compare.workers must be >= 1; got 0" in capsys.readouterr().err
+
+
 @pytest.mark.skipif(
     importlib.util.find_spec("distributed") is not None, reason="dask.distributed is installed"
 )

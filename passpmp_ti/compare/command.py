@@ -79,7 +79,8 @@ def run(given: argparse.Namespace, changes: Mapping[str, Any]) -> int:
     from passpmp_ti.compare.variant import modes
     from passpmp_ti.compare.workers import LostWorkerError, opened
 
-    count = door.whole("compare", "workers", given.workers or cores(), least=1)
+    count = cores() if given.workers is None else given.workers
+    door.whole("compare", "workers", count, least=1)
     comparison = Comparison(
         scenarios=[_placed(s) for s in given.scenarios], variants=modes(given.modes),
         episodes=given.episodes, seed=given.seed, changes=changes,
@@ -108,8 +109,7 @@ def run(given: argparse.Namespace, changes: Mapping[str, Any]) -> int:
             progress.end()
     told = document(
         comparison, results, date=datetime.date.today().isoformat(),
-        command=given.command,
-        workers=f"{count} workers" if given.scheduler is None else f"Dask at {given.scheduler}",
+        command=given.command, workers=_told(given.scheduler, count),
     )  # fmt: skip
     videos = {name: filmed(folder, jobs) for name, jobs in shots.items()}
     write_report(folder, told, {n: path.name for n, path in videos.items() if path.exists()})
@@ -141,6 +141,15 @@ def _film_all(shots: Mapping[str, Sequence[Job]], workers: Workers, folder: Path
             film(jobs, workers, path)
         except RuntimeError as error:  # the numbers are worth their page without it
             print(f"passpmp: no video of {name}: {error}", file=sys.stderr)
+
+
+def _told(scheduler: str | None, count: int) -> str:
+    """What drives the episodes, in words."""
+    if scheduler is None:
+        return "1 worker" if count == 1 else f"{count} workers"
+    from passpmp_ti.compare.workers import LOCAL
+
+    return f"{count} workers of Dask" if scheduler == LOCAL else f"Dask at {scheduler}"
 
 
 def _placed(scenario: str) -> str:

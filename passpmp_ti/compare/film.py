@@ -47,7 +47,8 @@ def reel_of(job: Job, panels: int) -> Reel:
     with ONE_AT_A_TIME:
         backend.init("cpu", threads=1)
         camera = _Camera(job.variant.name, job.loaded().bounds, panels)
-        simulate(job.loaded(), seed=job.seed, on_cycle=camera.see)
+        if simulate(job.loaded(), seed=job.seed, on_cycle=camera.see).interrupted:
+            raise KeyboardInterrupt
         return Reel(variant=job.variant.name, frames=tuple(camera.frames))
 
 
