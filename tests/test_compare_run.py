@@ -45,6 +45,12 @@ def scenario(tmp_path_factory):
     return str(path)
 
 
+@pytest.fixture(scope="module", autouse=True)
+def unrehearsed():
+    """Compiling every kernel beforehand makes costs comparable, and nothing else."""
+    jobs.REHEARSED.add((DifferentialDrive, "conservative"))
+
+
 def comparison(scenario, **others):
     return Comparison(**{"scenarios": [scenario], "variants": (FAST, SLOW), "episodes": 1} | others)
 
