@@ -56,6 +56,9 @@ def cost_chart(groups: Mapping[str, Group]) -> str:
 def arrival_chart(groups: Mapping[str, Group], longest: float) -> str:
     """Share of episodes that have reached the goal, against time; `longest`: of an episode [s]."""
     drawing = Drawing((WIDTH, HEIGHT), "Share of episodes at the goal, against time")
+    latest = [s["time_to_goal"] or 0.0 for g in groups.values() for s in g["seeds"].values()]
+    if any(latest):
+        longest = min(longest, 1.2 * max(latest))  # nothing happens after the last arrival
     axes = _axes(
         Axis(low=0.0, high=longest, label="time [s]"),
         Axis(low=0.0, high=1.0, label="at the goal by then", percent=True),
