@@ -7,6 +7,7 @@ import contextlib
 import io
 import math
 import os
+import shlex
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -14,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 from passpmp_ti import door
 from passpmp_ti.bench import command
+from passpmp_ti.compare import command as comparing
 
 if TYPE_CHECKING:
     from passpmp_ti.sim.scenario import Scenario
@@ -29,6 +31,7 @@ CERTIFIED = ("passpmp-pso", "passpmp")
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command; returns its exit code."""
     given = _parser().parse_args(arguments)
+    given.command = shlex.join(["passpmp", *(sys.argv[1:] if arguments is None else arguments)])
     os.environ.setdefault("ENABLE_TAICHI_HEADER_PRINT", "0")
     try:
         return int(given.action(given))
@@ -167,6 +170,10 @@ def _bench(given: argparse.Namespace) -> int:
     return command.run(given, scenario_of)
 
 
+def _compare(given: argparse.Namespace) -> int:
+    return comparing.run(given, _settings(given))
+
+
 def _attack(given: argparse.Namespace) -> int:
     if given.replay:
         return _replay(given)
@@ -283,13 +290,13 @@ def _scenario(given: argparse.Namespace) -> Scenario:
     """The scenario with what the command line changes in it."""
     from passpmp_ti.sim.scenario import load_scenario
 
-    settings: dict[str, Any] = {}
-    for assignment in given.set or ():
-        name, value = _assignment(assignment)
-        settings[name] = value
-    if given.cycle is not None:
-        settings["cycle"] = given.cycle
-    return load_scenario(given.scenario).changed(settings, object_speed=given.object_speed)
+    return load_scenario(given.scenario).changed(_settings(given), object_speed=given.object_speed)
+
+
+def _settings(given: argparse.Namespace) -> dict[str, Any]:
+    """The fields of `Settings` that the command line changes."""
+    settings = dict(_assignment(assignment) for assignment in given.set or ())
+    return settings if given.cycle is None else settings | {"cycle": given.cycle}
 
 
 def _assignment(text: str) -> tuple[str, Any]:
@@ -382,6 +389,16 @@ def _parser() -> argparse.ArgumentParser:
     )
     command.add_options(bench)
     _scenario_changes(bench)
+
+    compare = _command(
+        commands,
+        "compare",
+        "drive the same worlds in several safety modes, and write a page about it",
+        _compare,
+        comparing.EXAMPLE,
+    )
+    comparing.add_options(compare)
+    _scenario_changes(compare)
 
     _attack_options(
         _command(
