@@ -106,6 +106,17 @@ def test_what_is_kept_of_a_launch_is_never_taken_for_what_is_given():
     assert gone() is None
 
 
+def test_an_array_of_a_device_may_be_given_again_and_again():
+    there, back, out = values(), ti.ndarray(ti.f32, 5), np.empty(5, dtype=np.float32)
+    given = ti.ndarray(ti.f32, 5)
+    given.from_numpy(there)
+    for n in range(5):
+        scaled(1, given, 2.0, n, 0, back)
+        assert (back.to_numpy() == 2 * there + n).all()
+        scaled(1, given, 2.0, n, 0, out)
+        assert (out == 2 * there + n).all()
+
+
 def test_threads_do_not_take_each_others_arguments():
     def work(n):
         given, out = np.full(50, n, dtype=np.float32), np.empty(50, dtype=np.float32)

@@ -1,11 +1,14 @@
 """A model whose arrays stay where the kernels run is the model that a CPU makes."""
 
+import math
+
 import numpy as np
 import pytest
+from oracle import exact
 from oracle.cases import random_case
 from oracle.worlds import random_scans
 
-from passpmp_ti import FutureModel, device
+from passpmp_ti import DifferentialDrive, FutureModel, Navigator, Settings, device
 from passpmp_ti.grid import memory
 
 
@@ -64,3 +67,30 @@ def test_intruders_cap_memory_on_a_device_as_on_the_host():
     expected = memory.without_intruders(model, broken, 100, 0.4, case.settings)
     assert device.host(capped).tobytes() == expected.tobytes()
     assert (expected < model.ticks).any()
+
+
+def test_a_cycle_on_a_device_brings_no_map_to_the_host(monkeypatch):
+    robot = DifferentialDrive()
+    settings = Settings.for_robot(robot, object_speed=0.5, cell=0.1, capacity=200, particles=20)
+    world = exact.world_of([exact.box(2.0, 1.5, 0.5, 0.5)], [(1.5, -1.5, 0.3)])
+    brought = []
+
+    def host(array, plainly=device.host):
+        if not isinstance(array, np.ndarray):
+            brought.append(array.shape)
+        return plainly(array)
+
+    with device.forced():
+        navigator, state = Navigator(robot, settings, (5.0, 0.0)), np.zeros(5)
+        for k in range(4):
+            if k == 2:
+                monkeypatch.setattr(device, "host", host)
+            pose = tuple(float(v) for v in state[:3])
+            scan = exact.sweep(world, pose, 360, 2 * np.pi, 6.0, 0.1 * k, labelled=True)
+            plan = navigator.update(scan, state)
+            assert not navigator.record.fault
+            state = plan.at(0.1 * (k + 1))
+    assert navigator.record.tree_nodes > 100
+    assert navigator.model.shape == (128, 128)
+    # flags of returns, samples of a plan, leaves of particles
+    assert max(math.prod(shape) for shape in brought) <= 1000

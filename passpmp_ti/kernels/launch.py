@@ -5,8 +5,8 @@ than many of our kernels run. A `kernel` of this module is Taichi's own, and its
 set of template arguments is Taichi's own call, which compiles and checks everything. Later calls
 hand their arguments straight to what was compiled, after the checks that Taichi makes too: type,
 dimensions, contiguity. Whatever is not as expected takes Taichi's way, and its errors are Taichi's.
-What a launch hands over is kept for the next one, and arrays that are still the same are not handed
-over again; so an array must not be given another shape in place. No launch keeps an array alive.
+What a launch hands over is kept for the next one, and NumPy arrays that are still the same are not
+handed over again; so none may be given another shape in place. No launch keeps an array alive.
 
 This leans on parts of Taichi that its public interface does not show. Where they are missing every
 call takes Taichi's way.
@@ -50,7 +50,7 @@ def kernel(function):
             result = slow(*args)
             ready[key] = _compiled(primal, args)
             return result
-        _, made, compiled, idle = found
+        _, made, compiled, idle, on_cpu = found
         if compiled is None:
             return slow(*args)
         # taken while it is in use, so that no other thread's launch finds it
@@ -62,14 +62,15 @@ def kernel(function):
                 continue
             if not put(context, slot, value, wanted):
                 return slow(*args)
-            # a launch leaves its own pointer where a device's array was handed over
+            # a launch spoils what a context says of a device's array: that is handed over each time
             held[place] = weakref.ref(value) if type(value) is np.ndarray else _gone
         prog.launch_kernel(compiled, context)
         result = None
         if not whole:
             prog.synchronize()
             result = context.get_struct_ret_int((0,))
-        idle.append((context, held))
+        if on_cpu:
+            idle.append((context, held))
         return result
 
     launch.plain = slow
@@ -110,17 +111,18 @@ def _elements(dtype):
 
 def _compiled(primal, args):
     """(program, kernel, what it was compiled to, idle contexts of earlier launches with the arrays
-    that each holds); nothing compiled: it takes Taichi's way."""
+    that each holds, whether they may be launched again); not compiled: it takes Taichi's way."""
     prog = impl.get_runtime().prog
     # debugging checks more than can be seen from here
     if impl.current_cfg().debug:
-        return prog, None, None, []
+        return prog, None, None, [], False
     try:
         made = primal.compiled_kernels[primal.ensure_compiled(*args)]
         compiled = prog.compile_kernel(prog.config(), prog.get_device_caps(), made)
-        return prog, made, compiled, []
+        # other backends may leave in a context what is true of one launch only
+        return prog, made, compiled, [], prog.config().arch in (ti.x64, ti.arm64)
     except (AttributeError, KeyError, TypeError):
-        return prog, None, None, []
+        return prog, None, None, [], False
 
 
 def _gone():
