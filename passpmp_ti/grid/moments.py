@@ -41,7 +41,7 @@ NODE = 0.8
 """Side of a cell of the layers [standard deviations of the sharper objects]."""
 COARSEST = 1.2
 """The same of the sharpest object; what is sharper is blurred."""
-MOST_SIDE = 64
+MOST_SIDE = 48
 """Nodes along a side of a layer."""
 ROW = 22
 

@@ -57,6 +57,26 @@ class Forecast:
             object.__setattr__(self, field_, value)
 
 
+    def matched(self) -> Forecast:
+        """Each track as one Gaussian of the mixture's mean and covariance.
+
+        A third of the work for whatever is laid out of it; docs/tracking.md tells how it calibrates
+        beside the mixture.
+        """
+        weight = self.weight[:, :, None, None]
+        mean = (weight * self.mean).sum(axis=1, keepdims=True)
+        apart = self.mean - mean
+        spread = self.covariance + apart[..., :, None] * apart[..., None, :]
+        covariance = (weight[..., None] * spread).sum(axis=1, keepdims=True)
+        return Forecast(
+            times=self.times,
+            weight=np.ones((len(self.weight), 1)),
+            mean=mean,
+            covariance=0.5 * (covariance + covariance.swapaxes(-1, -2)),
+            radius=self.radius,
+        )
+
+
 def _shaped(name: str, value: object, shape: tuple[int, ...]) -> np.ndarray:
     found = door.array("Forecast", name, value, shape)
     return np.array(found) if np.asarray(value) is found and not found.flags.owndata else found
