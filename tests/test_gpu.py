@@ -5,6 +5,7 @@ process of its own is asked as well, once as it is and once with arrays that the
 place: that tries what this test is made of, and a GPU's ways without one.
 """
 
+import functools
 import os
 import subprocess
 import sys
@@ -92,9 +93,13 @@ def drawn(scene):
 
 
 @pytest.fixture(scope="module")
-def every_answer(arch, every_input, tmp_path_factory):
-    """What the backend makes of all inputs, in one process."""
-    folder = tmp_path_factory.mktemp("backend")
+def answers_of(every_input, tmp_path_factory):
+    """backend -> answers: each is asked once, in whatever order tests come to ask."""
+    return functools.cache(lambda arch: asked(arch, every_input, tmp_path_factory.mktemp(arch)))
+
+
+def asked(arch, every_input, folder):
+    """What a backend makes of all inputs, in one process."""
     for name, inputs in every_input.items():
         np.savez(folder / f"{name}.in.npz", **inputs)
     path = os.pathsep.join(p for p in (str(HOME), os.environ.get("PYTHONPATH")) if p)
@@ -112,8 +117,8 @@ def every_answer(arch, every_input, tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def found(every_answer, scene):
-    return every_answer[scene]
+def found(arch, answers_of, scene):
+    return answers_of(arch)[scene]
 
 
 @pytest.fixture(scope="module")
