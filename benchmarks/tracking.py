@@ -3,6 +3,7 @@
 python benchmarks/tracking.py accuracy                       # shipped scenarios, ETH, lidar logs
 python benchmarks/tracking.py accuracy --log FILE.log.gz     # another CARMEN log
 python benchmarks/tracking.py calibration                    # the ETH recording
+python benchmarks/tracking.py calibration --mixture          # mixtures, as hybrid mode takes them
 python benchmarks/tracking.py calibration --recording FILE --format obsmat --clock 25
 """
 
@@ -206,8 +207,9 @@ def calibration(options: argparse.Namespace) -> None:
             # extensions beyond the recording are straight: they would flatter
             known = (mine[:, 0] >= 0) & (first[mine] <= stamp).all(axis=1)
             known = known & (stamp + AHEAD[:, None] <= last[mine].min(axis=1))
+            forecast = tracks.forecast(stamp + AHEAD)
             asked += promises(
-                tracks.forecast(stamp + AHEAD),
+                forecast if options.mixture else forecast.reduced(),
                 movers.positions(stamp + AHEAD)[:, mine],
                 known,
                 movers.radius[mine],
@@ -242,6 +244,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--object-speed", type=float, help="the bound; else the fastest step")
     parser.add_argument("--seconds", type=float, default=math.inf, help="of the recording")
     parser.add_argument("--places", type=int, default=4, help="discs a track and horizon")
+    parser.add_argument("--mixture", action="store_true", help="calibration: all components")
     options = parser.parse_args(arguments)
     pti.init("cpu", threads=1)
     print(told(circumstances(1)) + "\n")

@@ -209,7 +209,7 @@ class FutureModel:
             ]
         )
         chances = chances_of(
-            forecast.matched(), robot, settings, position[:2], stamp, base, window.anchor, speed=speed,
+            forecast.reduced(), robot, settings, position[:2], stamp, base, window.anchor, speed=speed,
             emergence=settings.emergence, hidden_speeds=settings.hidden_speeds,
         )  # fmt: skip
         return cls(

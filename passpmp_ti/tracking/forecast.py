@@ -57,24 +57,59 @@ class Forecast:
             object.__setattr__(self, field_, value)
 
 
-    def matched(self) -> Forecast:
-        """Each track as one Gaussian of the mixture's mean and covariance.
+    def reduced(self) -> Forecast:
+        """Each track of three components as two: the pair that loses least by it becomes one Gaussian
+        of the same mean and covariance (Runnalls' bound on what is lost, in places, half way).
 
-        A third of the work for whatever is laid out of it; docs/tracking.md tells how it calibrates
-        beside the mixture.
+        Less work for whatever is laid out of it; docs/tracking.md tells how it calibrates beside
+        the mixture.
         """
-        weight = self.weight[:, :, None, None]
-        mean = (weight * self.mean).sum(axis=1, keepdims=True)
-        apart = self.mean - mean
-        spread = self.covariance + apart[..., :, None] * apart[..., None, :]
-        covariance = (weight[..., None] * spread).sum(axis=1, keepdims=True)
+        if self.weight.shape[1] != 3 or not len(self.weight):
+            return self
+        half = len(self.times) // 2
+        pairs = [(0, 1), (0, 2), (1, 2)]
+        places = self.mean[:, :, half, :2], self.covariance[:, :, half, :2, :2]
+        spread = np.log(np.maximum(np.linalg.det(places[1]), 1e-30))
+        lost = np.stack([self._lost(*places, spread, pair) for pair in pairs], axis=1)
+        choice = np.argmin(lost, axis=1)
+        weight = np.empty((len(self.weight), 2))
+        mean = np.empty((len(weight), 2, *self.mean.shape[2:]))
+        covariance = np.empty((len(weight), 2, *self.covariance.shape[2:]))
+        for n, pair in enumerate(pairs):
+            mine = choice == n
+            kept = 3 - sum(pair)
+            both = self.weight[mine][:, pair]
+            weight[mine, 0], weight[mine, 1] = self.weight[mine, kept], both.sum(axis=1)
+            mean[mine, 0], covariance[mine, 0] = self.mean[mine, kept], self.covariance[mine, kept]
+            mean[mine, 1], covariance[mine, 1] = _matched(
+                both, self.mean[mine][:, pair], self.covariance[mine][:, pair]
+            )
         return Forecast(
-            times=self.times,
-            weight=np.ones((len(self.weight), 1)),
-            mean=mean,
-            covariance=0.5 * (covariance + covariance.swapaxes(-1, -2)),
-            radius=self.radius,
+            times=self.times, weight=weight, mean=mean, covariance=covariance, radius=self.radius
         )
+
+    def _lost(
+        self, mean: np.ndarray, covariance: np.ndarray, spread: np.ndarray, pair: tuple[int, int]
+    ) -> np.ndarray:
+        """[N] what is lost at most if a pair of components becomes one (Runnalls 2007, eq. 16)."""
+        weight = self.weight[:, pair]
+        _, both = _matched(weight, mean[:, pair], covariance[:, pair])
+        whole = weight.sum(axis=1) * np.log(np.maximum(np.linalg.det(both), 1e-30))
+        return 0.5 * (whole - (weight * spread[:, pair]).sum(axis=1))
+
+
+def _matched(
+    weight: np.ndarray, mean: np.ndarray, covariance: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Mean [N, ..., d] and covariance [N, ..., d, d] of mixtures: weight [N, C], mean
+    [N, C, ..., d], covariance [N, C, ..., d, d]."""
+    share = weight / np.maximum(weight.sum(axis=1, keepdims=True), 1e-30)
+    share = share.reshape(*share.shape, *(1,) * (mean.ndim - 2))
+    middle = (share * mean).sum(axis=1)
+    apart = mean - middle[:, None]
+    spread = covariance + apart[..., :, None] * apart[..., None, :]
+    both = (share[..., None] * spread).sum(axis=1)
+    return middle, 0.5 * (both + both.swapaxes(-1, -2))
 
 
 def _shaped(name: str, value: object, shape: tuple[int, ...]) -> np.ndarray:
