@@ -12,6 +12,7 @@ import numpy as np
 from passpmp_ti import device, door
 from passpmp_ti.grid.moments import LEFT_OUT, Forecast, Moments, moments_of
 from passpmp_ti.grid.reach import Reach
+from passpmp_ti.grid.reused import Reused
 from passpmp_ti.grid.window import Window
 from passpmp_ti.kernels.chances import CHANNELS, MOST_POINTS, SCRATCH, rasterise_windows
 from passpmp_ti.kernels.hazard import KINDS, lay_hazard
@@ -34,6 +35,9 @@ RING_ERROR = 1e-3
 """Bound on the relative error of the integrals over a ring, see `points_of`."""
 ROUNDING = 1e-4
 """Relative, of the sums in single precision."""
+
+
+_memory = Reused()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -154,8 +158,8 @@ def chances_of(
         stamp: of the scan [s].
         base_ticks: from which ticks count [ms].
         anchor: from which places count [m].
-        speed: of the robot at `stamp` [m/s]; None: its top speed. The layers are the finer the
-            less far it can get.
+        speed: of the robot at `stamp` [m/s], which plans as `settings` tell: the layers are the
+            finer the less far it can get. None: it may drive at its top speed for good.
         emergence: chance that something comes out of what is hidden.
         hidden_speeds: equally likely speeds of it, as shares of `Settings.object_speed`.
         extra: added to the discs' radii [m].
@@ -180,7 +184,9 @@ def chances_of(
         )
     span = sample_steps(settings) * settings.time_step
     radius = body_radius(robot, settings, span) + extra + forecast.radius
-    moments = moments_of(forecast, radius, Reach.of(robot, position, stamp, speed, within), anchor)
+    plans_end = math.inf if speed is None else stamp + settings.horizon
+    reach = Reach.of(robot, position, stamp, speed, within, plans_end)
+    moments = moments_of(forecast, radius, reach, anchor)
     objects, components = forecast.weight.shape
     clock = 16 + len(speeds)
     odds = np.zeros(clock + len(moments.times), dtype=np.float32)
@@ -264,7 +270,7 @@ def rasterised(moments: Moments) -> tuple[device.Array, device.Array, device.Arr
     rows[wanted, 4:6] = 1 / spacing
     shapes = np.zeros((len(moments.wanted), 6), dtype=np.float32)
     shapes[wanted] = np.column_stack([deviation, radius, spacing, margin])
-    pool = device.empty((max(total, 1) * CHANNELS,), np.float32)
+    pool = _memory.floats(max(total, 1) * CHANNELS)
     there = device.put(places)
     if total:
         scratch = scratch_memory(device.resident())
@@ -284,7 +290,7 @@ def laid(
     """(layers, begins): the windows of all objects summed up about where the robot can be."""
     nodes = moments.sides.prod(axis=0)
     begins = np.stack([np.cumsum(nodes) - nodes, *moments.sides], -1).astype(np.int32)
-    layers = device.empty((int(nodes.sum()) * KINDS,), np.float32)
+    layers = _memory.floats(int(nodes.sum()) * KINDS)
     there = device.put(begins)
     lay_hazard(rows, places, near, pool, tally, grids, there, int(nodes.max()), layers)
     return layers, there

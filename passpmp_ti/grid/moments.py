@@ -23,10 +23,10 @@ LEFT_OUT = 1e-6
 """What an object that is not looked up may add to the risk [1/s]."""
 SMALLEST = 1e-6
 """Components of less weight than this are not looked up: their weight is risk."""
-BEND = 0.5
+BEND = 0.7
 """Greatest half length of a part times the root of how strongly a density is bent along time, that
 stretches between layers are cut into parts for."""
-STRAIGHT = 0.05
+STRAIGHT = 0.1
 """Greatest way of a mean off the middle of those before and after, for the layer to be left out
 [standard deviations]."""
 MOST_PARTS = 8
@@ -41,7 +41,7 @@ NODE = 0.8
 """Side of a cell of the layers [standard deviations of the sharper objects]."""
 COARSEST = 1.2
 """The same of the sharpest object; what is sharper is blurred."""
-MOST_SIDE = 48
+MOST_SIDE = 36
 """Nodes along a side of a layer."""
 ROW = 22
 

@@ -25,6 +25,7 @@ import taichi as ti
 
 from passpmp_ti.kernels.chances import flow_parts, is_near, moment_of, vec2
 from passpmp_ti.kernels.launch import kernel
+from passpmp_ti.kernels.spread import spread, spread_over
 
 KINDS = 8
 LOST = 1e3
@@ -53,11 +54,14 @@ def lay_hazard(
     # out
     layers: Numbers,
 ):
-    for index in range(begins.shape[0] * most):
-        j = index // most
+    # late layers have more in them than early ones
+    pieces = begins.shape[0] * most
+    for task in range(spread_over(pieces)):
+        index = spread(task, pieces)
+        j = ti.min(index // most, begins.shape[0] - 1)
         node = index % most
         columns = begins[j, 1]
-        if node < columns * begins[j, 2]:
+        if index < pieces and node < columns * begins[j, 2]:
             p = vec2(node % columns, node // columns) * grids[j, 3]
             p += vec2(grids[j, 0], grids[j, 1])
             total = kinds8(0.0)
