@@ -46,6 +46,7 @@ class Body:
         numbers[17] = settings.object_speed * settings.time_step
         numbers[18] = robot.overhang
         numbers[19] = LOOK * settings.cell
+        numbers[20] = robot.top_acceleration
         numbers[21] = 1 / settings.step_ms
         numbers[WAYS:] = ways_ahead(robot, settings).ravel()
         rates = {rate for _, rate, _ in robot.braking}

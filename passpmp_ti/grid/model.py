@@ -377,8 +377,8 @@ class FutureModel:
             )  # fmt: skip
         else:
             states_risk(
-                self.there.kind, self.hidden_ticks, self.hidden_spans, *robot,
-                *chances.hazard, poses, ticks, chance, control,
+                self.there.kind, self.hidden_ticks, self.hidden_spans, *robot, *chances.hazard,
+                poses, ticks, chance, control,
             )  # fmt: skip
         if len(self.unexplained):
             # what is seen and not tracked is there for sure, and as fast as may be

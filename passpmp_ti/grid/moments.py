@@ -41,7 +41,7 @@ NODE = 0.8
 """Side of a cell of the layers [standard deviations of the sharper objects]."""
 COARSEST = 1.2
 """The same of the sharpest object; what is sharper is blurred."""
-MOST_SIDE = 36
+MOST_SIDE = 28
 """Nodes along a side of a layer."""
 ROW = 22
 
@@ -101,7 +101,9 @@ def moments_of(
     layers = len(forecast.times)
     length = (forecast.times[-1] - forecast.times[0]) / (layers - 1)
     size = radius[:, None, None]
-    shape = Shape.of(forecast.covariance, size / SHARPEST)
+    # what the nodes of a layer that wide will blur anyway needs no moments of its own
+    coarse = 2 * reach.way(forecast.times) / (MOST_SIDE - 2) / COARSEST
+    shape = Shape.of(forecast.covariance, np.maximum(size / SHARPEST, coarse))
     wanted = _within_reach(forecast.mean, forecast.covariance, shape, size, reach, forecast.times)
     wanted &= (forecast.weight >= SMALLEST)[..., None]
     bends = bends_of(shape, forecast.mean, forecast.covariance, length)
@@ -175,15 +177,29 @@ def _moments_first(array: np.ndarray) -> np.ndarray:
 
 
 def _needless(mean: np.ndarray, shape: Shape, steepest: np.ndarray) -> list[int]:
-    """Every other layer, where means go straight on and densities hardly change."""
-    chord = mean[:, :, 1:-1, :2] - 0.5 * (mean[:, :, :-2, :2] + mean[:, :, 2:, :2])
-    off = np.hypot(chord[..., 0], chord[..., 1]) / shape.least[..., 1:-1]
-    smooth = off.max(axis=(0, 1), initial=0.0) < STRAIGHT
+    """Layers between others, where means go straight on and densities hardly change."""
     needless: list[int] = []
-    for k in range(1, len(steepest)):
-        if smooth[k - 1] and steepest[k - 1] + steepest[k] < BEND and k - 1 not in needless:
-            needless.append(k)
+    begin, last = 0, len(steepest)
+    while begin < last:
+        end = begin + 1
+        while (
+            end < last
+            and steepest[begin : end + 1].sum() < BEND
+            and _straight(mean, shape, begin, end + 1)
+        ):
+            end += 1
+        needless += range(begin + 1, end)
+        begin = end
     return needless
+
+
+def _straight(mean: np.ndarray, shape: Shape, begin: int, end: int) -> bool:
+    """Whether means between two layers lie evenly on the way from the one to the other."""
+    share = np.linspace(0.0, 1.0, end - begin + 1)[1:-1, None]
+    first, last = mean[:, :, begin, None, :2], mean[:, :, end, None, :2]
+    off = mean[:, :, begin + 1 : end, :2] - (first + share * (last - first))
+    far = np.hypot(off[..., 0], off[..., 1]) / shape.least[..., begin + 1 : end]
+    return bool(far.max(initial=0.0) < STRAIGHT)
 
 
 def _floor(

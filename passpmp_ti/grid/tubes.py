@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from passpmp_ti.tracking.forecast import Forecast
     from passpmp_ti.tracking.tracks import Tracks
 
-MOST_LAYERS = 32
+MOST_LAYERS = 20
 TICK = 1e-3
 """[s]"""
 SLACK = 1e-3

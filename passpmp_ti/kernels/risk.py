@@ -22,7 +22,6 @@ from passpmp_ti.kernels.check import (
     NEVER,
     arrival_at,
     control_of,
-    free_steps,
     robot_of,
 )
 from passpmp_ti.kernels.hazard import crossings, touch_sum
@@ -37,13 +36,11 @@ from passpmp_ti.kernels.motion import (
     Y,
     at_rest,
     braking_steps,
-    heading_for,
     pose7,
-    speed_of,
     step,
     tangent,
 )
-from passpmp_ti.kernels.spans import Spans
+from passpmp_ti.kernels.spans import LEVELS, Spans, level_for, span_about
 
 Numbers = ti.types.ndarray(dtype=ti.f32, ndim=1)
 Counts = ti.types.ndarray(dtype=ti.i32, ndim=1)
@@ -132,6 +129,58 @@ def way_need(
 def disc_at(numbers: ti.template(), d, q):
     offset = numbers[8 + d]
     return vec2(q[X] + offset * q[C], q[Y] + offset * q[S])
+
+
+@ti.func
+def sample_need(
+    kind: ti.template(),
+    arrival: ti.template(),
+    spans: ti.template(),
+    numbers: ti.template(),
+    counts: ti.template(),
+    robot,
+    odds: ti.template(),
+    before,
+    after,
+    tick,
+    control,
+    direction,
+    steps,
+    need,
+):
+    """The least of `need` and of what a sample of a motion needs: `steps` time steps from `before`,
+    at `tick`, to `after`.
+
+    One look a disc, which speaks for all places about the middle of its way: a need that may be too
+    small, never too great. Where some of them are never free, beside a wall, all looks are taken.
+    """
+    least = need
+    seconds = steps * numbers[1]
+    beside = False
+    for d in range(counts[5]):
+        p = disc_at(numbers, d, before)
+        way = disc_at(numbers, d, after) - p
+        middle = p + 0.5 * way
+        # the true way leaves the straight one by no more
+        radius = 0.5 * way.norm() + 0.125 * numbers[20] * seconds * seconds + numbers[19]
+        level = level_for(radius, numbers[0])
+        ticks = 0
+        if level < LEVELS:
+            ticks, _ = span_about(spans, counts, numbers[0], middle[0], middle[1], level)
+        if ticks == 0:
+            beside = True
+        else:
+            end = tick + steps * counts[4]
+            least = ti.min(least, needed_share(ticks, end, odds[SCANNED]))
+    if beside:
+        q = before
+        now = tick
+        for _ in range(steps):
+            ahead = step(kind, robot, q, control, direction, numbers[1])
+            least = way_need(arrival, numbers, counts, odds, q, ahead, now, least)
+            q = ahead
+            now += counts[4]
+    return least
 
 
 @ti.func
@@ -252,8 +301,6 @@ def risk_along(
     left = steps
     if steps < 0:
         left = braking_steps(kind, q, control, dt)
-    free = 0
-    level = 2
     moving = True
     going = left > 0
     if at_rest(kind, q):
@@ -270,24 +317,6 @@ def risk_along(
                 risk[TOUCH] += 0.5 * touched_now(
                     numbers, counts, layers, grids, begins, starts, odds, q, tick
                 )
-            if moving:
-                if free == 0 and risk[NEED] >= 0.0:
-                    # along a primitive speeds may grow, and no way is halved by braking
-                    speed = speed_of(kind, q)
-                    rest = left + 1
-                    if steps >= 0:
-                        speed = robot[0]
-                        rest = 2 * left + 2
-                    free, level = free_steps(
-                        spans, numbers, counts, q, speed, heading_for(kind, q), tick, rest, level
-                    )
-                if free > 0:
-                    free -= 1
-                else:
-                    risk[NEED] = way_need(
-                        arrival, numbers, counts, odds, q, ahead, tick, risk[NEED]
-                    )
-                    free += 1
             q = ahead
             tick += counts[4]
             taken += 1
@@ -300,6 +329,10 @@ def risk_along(
                 break
         if moving:
             after = 0.5 * taken * dt
+            risk[NEED] = sample_need(
+                kind, arrival, spans, numbers, counts, robot, odds, sample, q, sample_tick, control,
+                direction, taken, risk[NEED],
+            )  # fmt: skip
             risk[TOUCH] += crossed_about(
                 kind, numbers, counts, robot, layers, grids, begins, starts, odds, sample,
                 sample_tick, before, after,
