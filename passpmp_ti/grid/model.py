@@ -209,8 +209,8 @@ class FutureModel:
             ]
         )
         chances = chances_of(
-            forecast.reduced(), robot, settings, position[:2], stamp, base, window.anchor, speed=speed,
-            emergence=settings.emergence, hidden_speeds=settings.hidden_speeds,
+            forecast.reduced(), robot, settings, position[:2], stamp, base, window.anchor,
+            speed=speed, emergence=settings.emergence, hidden_speeds=settings.hidden_speeds,
         )  # fmt: skip
         return cls(
             robot, settings, window, stamp, base, laid.slowed(hidden.ticks, unexplained),

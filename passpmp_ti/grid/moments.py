@@ -49,16 +49,25 @@ ROW = 22
 class Forecast(Protocol):
     """What tracked objects will do: mixtures of Gaussians at equally spaced times."""
 
-    times: np.ndarray
-    """[L] absolute [s]."""
-    weight: np.ndarray
-    """[N, C] of each component; rows sum to 1."""
-    mean: np.ndarray
-    """[N, C, L, 4] (x, y, vx, vy) [m, m/s]."""
-    covariance: np.ndarray
-    """[N, C, L, 4, 4]."""
-    radius: np.ndarray
-    """[N] of the disc about the mean that covers the object [m]."""
+    @property
+    def times(self) -> np.ndarray:
+        """[L] absolute [s]."""
+
+    @property
+    def weight(self) -> np.ndarray:
+        """[N, C] of each component; rows sum to 1."""
+
+    @property
+    def mean(self) -> np.ndarray:
+        """[N, C, L, 4] (x, y, vx, vy) [m, m/s]."""
+
+    @property
+    def covariance(self) -> np.ndarray:
+        """[N, C, L, 4, 4]."""
+
+    @property
+    def radius(self) -> np.ndarray:
+        """[N] of the disc about the mean that covers the object [m]."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -20,7 +20,9 @@ if TYPE_CHECKING:
     from passpmp_ti.tracking.forecast import Forecast
     from passpmp_ti.tracking.tracks import Tracks
 
-MOST_LAYERS = 20
+MOST_LAYERS = {"hybrid": 32, "probabilistic": 20}
+"""Of a forecast. Tubes are known at their layers only, and give away what lies between; chances get
+moments of their own where they need them."""
 TICK = 1e-3
 """[s]"""
 SLACK = 1e-3
@@ -40,7 +42,7 @@ def layer_times(settings: Settings, robot: Robot, stamp: float) -> np.ndarray:
     """
     whole = last_braking_ends(settings, robot)
     apart = settings.layer_length
-    apart *= math.ceil(whole / apart / (MOST_LAYERS - 1) - 1e-9)
+    apart *= math.ceil(whole / apart / (MOST_LAYERS[settings.mode] - 1) - 1e-9)
     return stamp + apart * np.arange(math.ceil(whole / apart - 1e-9) + 1)
 
 

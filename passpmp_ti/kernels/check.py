@@ -17,8 +17,9 @@ unsafe that all looks would find safe, never the other way.
 Shared parameters:
     numbers f32: 0 cells a metre, 1 time step [s], 2-7 robot (kernels/motion.py), 8-15 disc offsets,
         16 looks a metre, 17 way of the fastest object in a time step [m], 18 farthest disc offset,
-        19 half a piece [m], 20 greatest acceleration of a disc's middle [m/s^2], 21 time steps a tick, 22 the one rate at which all braking
-        controls of a car brake, 23 their fastest steering (0: they differ), 24- ways of each level
+        19 half a piece [m], 20 greatest acceleration of a disc's middle [m/s^2], 21 time steps a
+        tick, 22 the one rate at which all braking controls of a car brake, 23 their fastest
+        steering (0: they differ), 24- ways of each level
     counts i32: 0 i0, 1 j0 (cell of the map's corner), 2 columns, 3 rows, 4 ticks a step,
         5 discs, 6 braking controls, 7 tree controls, 8- where each level of `spans` begins
 """

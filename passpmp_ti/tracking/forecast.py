@@ -58,8 +58,9 @@ class Forecast:
 
 
     def reduced(self) -> Forecast:
-        """Each track of three components as two: the pair that loses least by it becomes one Gaussian
-        of the same mean and covariance (Runnalls' bound on what is lost, in places, half way).
+        """Each track of three components as two: the pair that loses least by it becomes one
+        Gaussian of the same mean and covariance (Runnalls' bound on what is lost, in places, half
+        way).
 
         Less work for whatever is laid out of it; docs/tracking.md tells how it calibrates beside
         the mixture.
