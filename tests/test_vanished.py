@@ -98,7 +98,7 @@ def test_returns_break_a_premise_where_memory_has_a_free_cell_in_reach():
         ticks[generator.random((SIZE, SIZE)) < 0.005] = 65535
         points = generator.uniform((-0.5, -1.3), (6.5, 5.7), (200, 2))
         previous = SimpleNamespace(ticks=ticks, window=window)
-        views = SimpleNamespace(returns=lambda anchor, points=points: points)
+        views = SimpleNamespace(untracked=lambda anchor, points=points: points)
         given = broken_premises(previous, views, window, 100, robot, SETTINGS)
         wanted = broken_plainly(points, previous, 100, radius)
         assert np.array_equal(given, points[wanted])
