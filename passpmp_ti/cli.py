@@ -53,6 +53,11 @@ def _run(given: argparse.Namespace) -> int:
             f"--certificates: {given.planner} proves nothing; leave it out, or take --planner"
             f" {CERTIFIED[0]}"
         )
+    if given.certificates and scenario.settings.tracks:
+        raise ValueError(
+            f'--certificates are of what is proven strictly, and mode = "{scenario.settings.mode}" is'
+            ' a matter of chance; leave them out, or take --set mode=conservative'
+        )
     for folder in filter(None, (given.out, given.certificates)):
         Path(folder).mkdir(parents=True, exist_ok=True)
     summaries: list[Mapping[str, Any]] = []
