@@ -202,13 +202,19 @@ def chances_of(
     )
     there = device.put(tally)
     rows, places, pool = rasterised(moments)
-    near, grids = device.put(moments.near), device.put(moments.grids)
+    near, grids = _put(moments.near), _put(moments.grids)
     layers, begins = laid(moments, rows, places, near, pool, there, grids)
     return Chances(
         forecast, robot, settings, stamp, base_ticks, anchor, emergence,
         tuple(float(s) for s in speeds), rows, places, near, pool, layers, grids, begins,
         device.put(moments.starts), device.put(odds), there,
     )  # fmt: skip
+
+
+def _put(values: np.ndarray) -> device.Array:
+    """`values` where the kernels read them; a row of zeros, which nobody asks for, instead of none:
+    a device has no empty arrays."""
+    return device.put(values if len(values) else np.zeros((1, *values.shape[1:]), values.dtype))
 
 
 def sample_steps(settings: Settings) -> int:
@@ -271,11 +277,11 @@ def rasterised(moments: Moments) -> tuple[device.Array, device.Array, device.Arr
     shapes = np.zeros((len(moments.wanted), 6), dtype=np.float32)
     shapes[wanted] = np.column_stack([deviation, radius, spacing, margin])
     pool = _memory.floats(max(total, 1) * CHANNELS)
-    there = device.put(places)
+    there = _put(places)
     if total:
         scratch = scratch_memory(device.resident())
-        rasterise_windows(device.share(), WORKERS, there, device.put(shapes), scratch, pool)
-    return device.put(rows), there, pool
+        rasterise_windows(device.share(), WORKERS, there, _put(shapes), scratch, pool)
+    return _put(rows), there, pool
 
 
 def laid(
