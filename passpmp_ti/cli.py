@@ -55,8 +55,8 @@ def _run(given: argparse.Namespace) -> int:
         )
     if given.certificates and scenario.settings.tracks:
         raise ValueError(
-            f'--certificates are of what is proven strictly, and mode = "{scenario.settings.mode}" is'
-            ' a matter of chance; leave them out, or take --set mode=conservative'
+            f"--certificates are of what is proven strictly, and {scenario.settings.mode} mode is a"
+            " matter of chance; leave them out, or take --set mode=conservative"
         )
     for folder in filter(None, (given.out, given.certificates)):
         Path(folder).mkdir(parents=True, exist_ok=True)
