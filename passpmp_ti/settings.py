@@ -42,10 +42,10 @@ class Settings:
     # what is assumed of movers that are tracked, and of the hidden ones as a chance
     confidence: float = 0.99
     """Chance that a tracked mover stays, over all of the horizon, where "hybrid" takes it to be."""
-    allowed_risk: float = 0.02
+    allowed_risk: float = 0.03
     """Greatest chance of a contact while moving that one plan may have."""
-    allowed_risk_rate: float = 0.02
-    """The same for each second of a plan [1/s]."""
+    allowed_risk_rate: float = 0.03
+    """The same for each second of a plan that is longer than one [1/s]."""
     risk: str = "any"
     """"any": the chance of a contact at any time with any mover, bounded from above; "paper": eqs.
     9-17 as printed, products over times and over the states of a plan."""

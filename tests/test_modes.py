@@ -163,7 +163,7 @@ def test_in_the_printed_form_many_factors_make_every_risk_vanish():
     state[0, :3] = -0.6, -1.0, np.pi
     state[0, 3:] = 1.2
     times = np.array([model.stamp + 0.1])
-    print(model.collision_probability(state, times), printed.collision_probability(state, times))
+
     assert model.collision_probability(state, times)[0] > 0.5
     assert printed.collision_probability(state, times)[0] < 1e-3
 

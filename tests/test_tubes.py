@@ -137,6 +137,10 @@ def test_a_tube_is_never_wider_than_the_bound_of_speed():
     x, y = ((k + 0.5) * settings.cell + o for k, o in zip((i, j), window.origin, strict=True))
     gap = np.hypot(x - tracks.last_centre[0, 0], y - tracks.last_centre[0, 1])
     gap -= module.away_from_tube(ROBOT, settings, settings.cell) + 0.3
+    # and where he was seen is known no better than the track says
+    allowed = 0.9 * (1 - settings.confidence) / len(forecast.times)
+    spread = np.linalg.eigvalsh(wide.covariance[:, :, 0, :2, :2])[..., -1].max()
+    gap -= np.sqrt(-2 * np.log(allowed) * spread)
     half = 0.5 * (forecast.times[1] - forecast.times[0])
     end = int((STAMP + module.last_braking_ends(settings, ROBOT) - BASE) * 1000)
     reached = ticks < end

@@ -79,7 +79,7 @@ def test_certain_movers_at_the_bound_leave_no_node_that_the_strict_mode_refuses(
 def test_risks_are_promised_and_weigh():
     settings = pti.Settings(mode="probabilistic", allowed_risk=0.1, allowed_risk_rate=0.05)
     assert safety_weight(settings, 0.05, 2.0) == pytest.approx(1 / 0.95)
-    assert np.isinf(safety_weight(settings, 0.05, 0.5))
+    assert np.isinf(safety_weight(settings, 0.06, 0.5))
     assert np.isinf(safety_weight(settings, 0.11, 9.0))
     printed = settings.changed(risk="paper")
     assert safety_weight(printed, 0.05, 2.0) == 0.05

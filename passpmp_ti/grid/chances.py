@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import functools
 import math
+import threading
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
@@ -233,6 +233,7 @@ def body_radius(robot: Robot, settings: Settings, span: float) -> float:
         + settings.tracking_error
         + 2 * settings.localisation_error
         + robot.top_acceleration * span**2 / 8
+        + settings.object_speed * settings.stamp_error
         + integration_margin(robot, settings.time_step)
     )
 
@@ -279,8 +280,7 @@ def rasterised(moments: Moments) -> tuple[device.Array, device.Array, device.Arr
     pool = _memory.floats(max(total, 1) * CHANNELS)
     there = _put(places)
     if total:
-        scratch = scratch_memory(device.resident())
-        rasterise_windows(device.share(), WORKERS, there, _put(shapes), scratch, pool)
+        rasterise_windows(device.share(), WORKERS, there, _put(shapes), _scratch(), pool)
     return _put(rows), there, pool
 
 
@@ -302,7 +302,17 @@ def laid(
     return layers, there
 
 
-@functools.cache
-def scratch_memory(resident: bool) -> device.Array:
-    """What the workers of `rasterise_windows` write on; as `device.resident` tells."""
-    return device.empty((WORKERS * SCRATCH,), np.float32)
+class _Scratch(threading.local):
+    """What each thread's `rasterise_windows` writes on."""
+
+    def __init__(self) -> None:
+        self._arrays: dict[bool, device.Array] = {}
+
+    def __call__(self) -> device.Array:
+        key = device.resident()
+        if key not in self._arrays:
+            self._arrays = {key: device.empty((WORKERS * SCRATCH,), np.float32)}
+        return self._arrays[key]
+
+
+_scratch = _Scratch()

@@ -40,6 +40,8 @@ if TYPE_CHECKING:
 
 TICK = 1e-3
 """[s]"""
+OFF_SPEED = 0.05
+"""Share of its top speed by which a robot may be faster than it should be."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -186,9 +188,11 @@ class FutureModel:
         robot, settings, window = ground.robot, ground.settings, ground.window
         base = ground.base_ticks
         tracks = _followed(ground.labels, previous, settings, stamp)
-        # memory has no cones for movers that were tracked: one that is lost may be anywhere
-        memory = None if previous is None or tracks.ended else previous.memory
-        hidden = proven(ground, memory, [owner >= 0 for owner in tracks.owner])
+        # Memory has no cones for movers that were tracked: one that is lost may be anywhere. So may
+        # be whom a track was about that is met again, perhaps in somebody else.
+        lost = tracks.ended or (previous is not None and _met_again(previous.tracks, tracks))
+        memory = None if previous is None or lost else previous.memory
+        hidden = proven(ground, memory, tracks.owner)
         forecast = tracks.forecast(layer_times(settings, robot, stamp))
         laid = Laid(window, base * TICK, stamp, robot, settings)
         if settings.mode == "hybrid":
@@ -208,9 +212,12 @@ class FutureModel:
                 )
             ]
         )
+        # the robot may be off the plan that the tree begins with
+        off = settings.tracking_error + 2 * settings.localisation_error + settings.cell
         chances = chances_of(
             forecast.reduced(), robot, settings, position[:2], stamp, base, window.anchor,
-            speed=speed, emergence=settings.emergence, hidden_speeds=settings.hidden_speeds,
+            speed=None if speed is None else speed + OFF_SPEED * robot.top_speed, within=off,
+            emergence=settings.emergence, hidden_speeds=settings.hidden_speeds,
         )  # fmt: skip
         return cls(
             robot, settings, window, stamp, base, laid.slowed(hidden.ticks, unexplained),
@@ -381,12 +388,7 @@ class FutureModel:
                 poses, ticks, chance, control,
             )  # fmt: skip
         if len(self.unexplained):
-            # what is seen and not tracked is there for sure, and as fast as may be
-            size = (self.window.size, self.window.size)
-            cones = capped(
-                device.full(size, NEVER, np.uint16), self.unexplained, self.window, self.robot,
-                self.settings,
-            )  # fmt: skip
+            cones = self._cones()
             spans = spans_of(cones, self.counts, self.window.size)
             chance[self._proved_on(cones, spans, states, ticks) < 0] = 1.0
         return np.minimum(chance, 1.0).astype(np.float64)
@@ -394,7 +396,7 @@ class FutureModel:
     def motion_risk(self, states: np.ndarray, times: np.ndarray) -> float:
         """Chance that something touches the robot while it moves along a path, bounded from above.
 
-        Of what `chances` tell; whether the path is clear of what is there for sure `touched` tells.
+        1 where it leads into what is seen and not tracked: that is there for sure.
 
         Args:
             states: [n, 5], at most a sample of the risk apart.
@@ -403,6 +405,11 @@ class FutureModel:
         assert self.chances is not None
         poses, ticks = to_poses(states, self.window.anchor), self.ticks_of(times)
         robot = self.there.numbers, self.counts
+        if len(self.unexplained):
+            met = np.zeros(len(states), dtype=np.int32)
+            check_path(self.there.kind, self._cones(), *robot, poses, ticks, met)
+            if met.any():
+                return 1.0
         if self.settings.risk == "paper":
             each = np.zeros(len(states), dtype=np.float32)
             printed_path_risk(
@@ -465,6 +472,15 @@ class FutureModel:
             count = math.ceil(horizon / self.settings.layer_length)
         return np.stack([self.layer(index) for index in range(count)])
 
+    def _cones(self) -> device.Array:
+        """[J, I] uint16: when what is seen and not tracked could be where, at the bound."""
+        if "cones" not in self._copies:
+            never = device.full((self.window.size, self.window.size), NEVER, np.uint16)
+            self._copies["cones"] = capped(
+                never, self.unexplained, self.window, self.robot, self.settings
+            )
+        return self._copies["cones"]
+
     def _on_host(self, name: str) -> np.ndarray:
         """One of the arrays, where NumPy reads it; brought there once."""
         if name not in self._copies:
@@ -516,6 +532,14 @@ def _window_for(
         size = size_for(furthest, settings.cell)
     anchor = previous.window.anchor if previous is not None else None
     return Window.around(position[0], position[1], size, settings.cell, anchor)
+
+
+def _met_again(before: Tracks | None, now: Tracks) -> bool:
+    """Whether a track is met that was not met in the cycle before."""
+    if before is None:
+        return False
+    missed = before.ids[~before.seen]
+    return bool(np.isin(now.ids[now.seen], missed).any())
 
 
 def _followed(

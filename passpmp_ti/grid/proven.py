@@ -44,18 +44,19 @@ class Proven:
 
 
 def proven(
-    ground: Ground, memory: Memory | None, tracked: Sequence[np.ndarray] | None = None
+    ground: Ground, memory: Memory | None, owners: Sequence[np.ndarray] | None = None
 ) -> Proven:
     """When something could first be where.
 
     Args:
         ground: what the scans met.
         memory: what the model before proved of the same sources; arrivals are never earlier.
-        tracked: for each scan [n] bool, returns that are no sources; None: all are.
+        owners: for each scan [n] the tracked mover that a return belongs to, which is then no
+            source; -1: none. None: all are sources.
     """
     window, robot, settings = ground.window, ground.robot, ground.settings
     views = views_of(
-        ground.labels, ground.empty_discs, settings, window.anchor, ground.static_map, tracked
+        ground.labels, ground.empty_discs, settings, window.anchor, ground.static_map, owners
     )
     seen, marks = rasterised(views, window, settings)
     ticks, marks, broken = arrival(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import threading
+import queue
 import weakref
 
 import numpy as np
@@ -15,23 +15,33 @@ SPARE = 4
 
 class Reused:
     """Hands out single-precision arrays, and takes back their memory when nobody holds them any
-    more."""
+    more. A slice of such an array does not keep it: do not take one."""
 
     def __init__(self) -> None:
-        self._free: list[np.ndarray] = []
-        self._lock = threading.Lock()
+        # collectors run anywhere, in `floats` too: only what is re-entrant may be touched there
+        self._back: queue.SimpleQueue[np.ndarray] = queue.SimpleQueue()
 
     def floats(self, count: int) -> device.Array:
         """[count] float32, not set."""
         if device.resident():
             return device.empty((count,), np.float32)
-        with self._lock:
-            fits = [n for n, block in enumerate(self._free) if len(block) >= count]
-            block = self._free.pop(fits[0]) if fits else np.empty(count + count // 4, np.float32)
+        block = None
+        for spare in self._taken()[:SPARE]:
+            if block is None and len(spare) >= count:
+                block = spare
+            else:
+                self._back.put(spare)
+        if block is None:
+            block = np.empty(count + count // 4, np.float32)
         array = block[:count]
-        weakref.finalize(array, self._take_back, block).atexit = False
+        weakref.finalize(array, self._back.put, block).atexit = False
         return array
 
-    def _take_back(self, block: np.ndarray) -> None:
-        with self._lock:
-            self._free = sorted([*self._free, block], key=len)[-SPARE:]
+    def _taken(self) -> list[np.ndarray]:
+        """All blocks that came back, the smallest first."""
+        blocks = []
+        try:
+            while True:
+                blocks.append(self._back.get_nowait())
+        except queue.Empty:
+            return sorted(blocks, key=len)

@@ -66,8 +66,9 @@ def away_from_tube(robot: Robot, settings: Settings, cell: float) -> float:
 
 
 def strayed(settings: Settings, half: float) -> float:
-    """How far a mover gets from where a layer knows it to be, half a layer before or after [m]."""
-    return settings.object_speed * half
+    """How far a mover gets from where a layer knows it to be, half a layer before or after [m]; the
+    scan may be older than its stamp tells."""
+    return settings.object_speed * (half + settings.stamp_error)
 
 
 def tubes_of(
@@ -124,7 +125,9 @@ def tubes_of(
     first = np.floor((age - half) / TICK).clip(0, LATEST)
     reached = forecast.times + half - np.array(tracks.last_seen)[:, None] + settings.stamp_error
     disc = np.maximum(np.array(tracks.last_radius), forecast.radius)[:, None] + v_b * reached
-    disc += kept
+    # where it was seen is an estimate as well, no worse than the track's
+    great = np.linalg.eigvalsh(forecast.covariance[:, :, 0, :2, :2])[..., -1].max(axis=1)
+    disc += kept + np.sqrt(q2 * great)[:, None]
 
     anchor = np.array(window.anchor)
     rows = np.zeros((count, parts, layers, 12))

@@ -127,7 +127,7 @@ def views_of(
     settings: Settings,
     anchor: tuple[float, float],
     static_map: StaticMap | None,
-    tracked: Sequence[np.ndarray] | None = None,
+    owners: Sequence[np.ndarray] | None = None,
 ) -> Views:
     """Work out what the scans prove.
 
@@ -137,7 +137,8 @@ def views_of(
         settings: object width, noise, map tolerance.
         anchor: of the window [m].
         static_map: declares surfaces that stay.
-        tracked: for each scan [n] bool, returns of movers that are asked about by themselves.
+        owners: for each scan [n] the mover that a return belongs to, which is asked about by
+            itself; -1: none.
     """
     scans = labels.scans
     count = len(scans) + len(empty_discs)
@@ -159,12 +160,13 @@ def views_of(
     for v, scan in enumerate(scans):
         n = len(scan.ranges)
         beams[v] = n
-        own = labels.met[v]
-        if tracked is not None:
-            own = np.where((own == wedges.MOVABLE) & tracked[v], wedges.TRACKED, own)
+        own, owner = labels.met[v], labels.met[v]  # nobody is tracked: nobody's owner is asked for
+        if owners is not None:
+            owner = owners[v].astype(np.int32)
+            own = np.where((own == wedges.MOVABLE) & (owner >= 0), wedges.TRACKED, own)
             own = own.astype(np.int32)
         wedges.prove_wedges(
-            labels.ranges[v], own, view, v, int(labels.closed[v]), settings.object_width,
+            labels.ranges[v], own, owner, view, v, int(labels.closed[v]), settings.object_width,
             by_map_width, settings.range_noise, labels.map_cells, labels.frame, reach, far_side,
         )  # fmt: skip
         ranges[v, :n] = labels.ranges[v]

@@ -146,6 +146,7 @@ def prove_wedges(
     # in
     ranges: Floats,  # [n]
     met: Ints,  # [n]
+    owner: Ints,  # [n] which mover a TRACKED return belongs to
     view: ti.types.ndarray(dtype=ti.f32, ndim=2),  # [V, 8]
     v: ti.i32,
     closed: ti.i32,  # 1: the beams go all the way round
@@ -194,7 +195,8 @@ def prove_wedges(
             proven = ti.max(limit * (1.0 - half - 0.5 * half * half) - noise - SLACK, 0.0)
             by_map = met[a] == STATIC_BY_MAP or met[b] == STATIC_BY_MAP
             narrow = not by_map or ti.max(ranges[a], ranges[b]) * angle <= by_map_width
-            both_tracked = met[a] == TRACKED and met[b] == TRACKED
+            # between two movers somebody may come out as soon as they part
+            both_tracked = met[a] == TRACKED and met[b] == TRACKED and owner[a] == owner[b]
             both_stay = stays(met[a]) and stays(met[b]) and narrow
             if (both_stay or both_tracked) and limit == far:
                 xa = end_x(view, v, a, ranges[a])

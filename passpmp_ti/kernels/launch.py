@@ -54,7 +54,10 @@ def kernel(function):
         if compiled is None:
             return slow(*args)
         # taken while it is in use, so that no other thread's launch finds it
-        context, held = idle.pop() if idle else (made.make_launch_context(), [_gone] * count)
+        try:
+            context, held = idle.pop()
+        except IndexError:
+            context, held = made.make_launch_context(), [_gone] * count
         for place, slot, put, wanted in setters:
             value = args[place]
             # many arrays are those of the launch before

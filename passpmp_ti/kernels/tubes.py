@@ -8,7 +8,7 @@ only tell when a place is first lost, which errs to the unsafe side.
     tubes f32 [K, 12], one tube's moments after another's: 0 first tick, 1 x, 2 y of the ellipse's
         middle, 3 xx, 4 xy, 5 yy of the form that is at most 1 inside it, 6 x, 7 y, 8 radius of the
         disc, 9: 1 where a tube begins, 10 least, 11 greatest y of what is inside both;
-        places in metres from the anchor, grown by the clearance and by half a cell's diagonal
+        places in metres from the anchor; both are grown by all margins (grid/tubes.py)
 """
 
 import taichi as ti

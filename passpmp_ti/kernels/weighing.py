@@ -22,6 +22,8 @@ PARENT, TICK = 0, 3
 """Of a node's link, see kernels/tree.py."""
 WEIGHT = 5
 """Of a node's cost: w_ps, see there."""
+SHORTEST = 1.0
+"""[s] Shorter plans are allowed as much risk as one of this length: nobody could set off else."""
 GRAIN = 4
 """Children that one thread weighs in one go."""
 CARRIED, W_PS = 9, 11
@@ -87,7 +89,8 @@ def weigh_children(
                             direction = 0.0
                             length = -1
                             seconds = braking_steps(kind, q, control, numbers[1]) * numbers[1]
-                            bound = ti.min(allowed, allowed_rate * (elapsed + seconds))
+                            whole_time = ti.max(elapsed + seconds, SHORTEST)
+                            bound = ti.min(allowed, allowed_rate * whole_time)
                             clear = brakes_clear(
                                 kind, arrival, spans, numbers, counts, robot, q, tick, control
                             )

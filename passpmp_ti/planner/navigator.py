@@ -20,6 +20,7 @@ from passpmp_ti.planner.intake import Heard, Intake, standing
 from passpmp_ti.planner.objective import trajectory_cost
 from passpmp_ti.planner.place import allowed_gap, carried_on, gap, stitched
 from passpmp_ti.planner.plan import (
+    allowed_brake,
     brake_at_once,
     braking_off,
     calmest,
@@ -208,6 +209,7 @@ class Navigator:
             record = replace(
                 record, decision="brake", reason=alarm, chosen=self.held,
                 plan_time=max(self.held.end - start, 0.0), decision_time=0.0,
+                risk=risk_of(model, self.held, start),
             )  # fmt: skip
         self.model, self._modelled = model, True
         self._heard_at = stamp
@@ -265,6 +267,7 @@ class Navigator:
             stamp=self.record.stamp if math.isnan(stamp) else stamp, decision="held",
             reason=reason, lost_scan=reason if unheard else "", fault=fault, not_taken=not_taken,
             goal=self.goal, plan_time=self.held.duration, chosen=self.held,
+            risk=self.record.risk,  # as far as anybody knows
         )  # fmt: skip
 
     def _plan(
@@ -284,18 +287,21 @@ class Navigator:
             return replace(record, decision="arrived", chosen=self.held)
 
         if budget.explored():
-            return self._without_tree(record, "the model left no time to plan before the deadline")
+            return self._without_tree(record, root, "the model left no time to plan")
         guide = self._guide_field(model, state)
         budget.lap("guide")
         if budget.explored():
-            return self._without_tree(record, "the guide left no time to plan before the deadline")
-        tree = self._grower.grow(model, guide, root, start, proof, until=budget.until)
+            return self._without_tree(record, root, "the guide left no time to plan")
+        weight = 1.0
+        if settings.mode == "probabilistic":
+            proof, weight = allowed_brake(model, root, start)
+        tree = self._grower.grow(
+            model, guide, root, start, proof, until=budget.until, weight=weight
+        )
         budget.lap("tree")
         budget.grown()
         leaf, particles, cost_new = self._choose(tree)
-        weight = safety_weight(settings, record.held_risk, self.held.end - start)
-        if settings.tracks and not record.held_clear and not self._laid:
-            weight = math.inf
+        weight = self._held_weight(record, start)
         cost_held = math.inf
         if math.isfinite(weight):
             cost_held = trajectory_cost(self.held, start, guide, settings, self.robot) * weight
@@ -321,19 +327,36 @@ class Navigator:
             record, decision=decision, reason="" if decision == "new" else reason, tree=tree,
             risk=risk_of(model, chosen, start),
             tree_nodes=tree.count, tree_depth=tree.depth, tree_stopped_by=tree.stopped_by,
-            cost=cost_held if plan is None else cost_new, cost_new=cost_new, cost_held=cost_held,
+            cost=cost_new if decision == "new" else cost_held, cost_new=cost_new,
+            cost_held=cost_held,
             plan_time=max(chosen.end - start, 0.0),
             decision_time=partial(decision_time, model, chosen, record.stamp, start),
             particle_leaves=particles, chosen=chosen,
         )  # fmt: skip
 
-    def _without_tree(self, record: CycleRecord, reason: str) -> CycleRecord:
-        """What is held is kept, since there was no time to look for anything better."""
+    def _held_weight(self, record: CycleRecord, start: float) -> float:
+        """w_ps of what is held (eqs. 8 and 9); infinite where a track made it too risky to keep."""
         assert self.held is not None
+        if self.settings.tracks and not record.held_clear and not self._laid:
+            return math.inf
+        return safety_weight(self.settings, record.held_risk, self.held.end - start)
+
+    def _without_tree(self, record: CycleRecord, root: np.ndarray, reason: str) -> CycleRecord:
+        """There was no time to look for anything better before the deadline: what is held is kept,
+        or, where it is too risky to keep, whatever has the least risk."""
+        assert self.held is not None
+        assert record.model is not None
         start = record.stamp + self.settings.cycle
+        chosen = self.held
+        if math.isinf(self._held_weight(record, start)):
+            chosen = calmest(record.model, self.held, root, start)
+        decision = "held" if chosen is self.held else "brake"
+        if chosen is not self.held:
+            self._hold(chosen)
         return replace(
-            record, reason=reason, chosen=self.held, plan_time=max(self.held.end - start, 0.0)
-        )
+            record, decision=decision, reason=f"{reason} before the deadline", chosen=chosen,
+            plan_time=max(chosen.end - start, 0.0), risk=risk_of(record.model, chosen, start),
+        )  # fmt: skip
 
     def _arrive(self, state: np.ndarray, root: np.ndarray, start: float) -> bool:
         """At rest at a goal: go on to the next one, or stay for good at the last."""

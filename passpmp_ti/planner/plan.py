@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from passpmp_ti.grid.body import to_poses, to_states
 from passpmp_ti.grid.model import FutureModel
 from passpmp_ti.kernels.tree import PROOF
-from passpmp_ti.planner.risk import risk_of
+from passpmp_ti.planner.risk import risk_of, safety_weight
 from passpmp_ti.planner.tree import Tree, follow
 from passpmp_ti.trajectory import Trajectory
 
@@ -57,6 +59,18 @@ def calmest(
         clear.append(float(way.times[np.argmax(taken)]) if taken.any() else np.inf)
     risks = [risk_of(model, way, start) for way in ways]
     return ways[min(range(len(ways)), key=lambda k: (risks[k], -clear[k], k))]
+
+
+def allowed_brake(model: FutureModel, root: np.ndarray, start: float) -> tuple[int, float]:
+    """(first braking control from `root` [5] at `start` [s] that is clear of what is there for sure
+    and risks no more than is allowed, its w_ps); -1 where there is none."""
+    state = model.robot.within_limits(root)
+    for control in range(len(model.body.braking)):
+        brake = braking_from(model, state, start, control)
+        weight = safety_weight(model.settings, risk_of(model, brake, start), brake.duration)
+        if math.isfinite(weight) and still_clear(model, brake):
+            return control, weight
+    return -1, 1.0
 
 
 def braking_off(model: FutureModel, road: Trajectory, start: float) -> Trajectory:

@@ -7,25 +7,27 @@ import math
 import numpy as np
 
 from passpmp_ti.grid.model import FutureModel
+from passpmp_ti.kernels.weighing import SHORTEST
 from passpmp_ti.settings import Settings
 from passpmp_ti.trajectory import Trajectory
 
 
 def allowed_risk(settings: Settings, duration: float) -> float:
     """Greatest chance of a contact while moving that a plan of `duration` [s] to rest may have."""
-    return min(settings.allowed_risk, settings.allowed_risk_rate * max(duration, settings.cycle))
+    return min(settings.allowed_risk, settings.allowed_risk_rate * max(duration, SHORTEST))
 
 
 def safety_weight(settings: Settings, risk: float, duration: float) -> float:
     """w_ps of a plan (eqs. 8 and 9): infinite where its risk is more than is allowed.
 
-    As printed, eq. 9 makes every riskless plan cost nothing, whatever the goal: there, 1 / (1 - P).
+    As printed, w_ps is the risk, and every riskless plan costs nothing, whatever the goal; nothing
+    is refused for its risk then. Here it is 1 / (1 - P).
     """
     if settings.mode != "probabilistic":
         return 1.0
-    if risk > allowed_risk(settings, duration):
-        return math.inf
-    return risk if settings.risk == "paper" else 1 / (1 - risk)
+    if settings.risk == "paper":
+        return risk
+    return math.inf if risk > allowed_risk(settings, duration) else 1 / (1 - risk)
 
 
 def risk_of(model: FutureModel, trajectory: Trajectory, since: float) -> float:

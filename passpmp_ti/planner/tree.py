@@ -249,7 +249,7 @@ class TreeGrower:
 
     def grow(
         self, model: FutureModel, guide: GuideField, root: np.ndarray, start: float, proof: int,
-        *, until: float | None = None,
+        *, until: float | None = None, weight: float = 1.0,
     ) -> Tree:
         """Grow a tree from `root`, level by level, until depth, capacity or time ends it.
 
@@ -259,6 +259,7 @@ class TreeGrower:
             root: [5] state s_{k+1}.
             start: t_{k+1}, absolute [s].
             proof: index of a braking control that proves the root; -1: none known.
+            weight: w_ps of that braking (eqs. 8 and 9).
             until: on `time.perf_counter`'s clock [s]; no chunk of parents is begun that would
                 probably end later. None: no deadline.
         """
@@ -273,7 +274,7 @@ class TreeGrower:
             settings.capacity,
             root_pose,
             np.array([NO_PARENT, 0, 0, model.ticks_of(start), proof, -1, 0, 0], dtype=np.int32),
-            np.array([0.0, here, 0.0, here, 0.0, 1.0], dtype=np.float32),
+            np.array([0.0, here, 0.0, here, 0.0, weight], dtype=np.float32),
         )
         fixed = (
             model.ticks, model.spans, guide.time, guide.ahead, guide.frame, body.numbers,

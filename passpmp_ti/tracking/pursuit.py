@@ -77,7 +77,7 @@ def follow(
             speed=speed,
             bank=bank.taken(alive),
             owner=owner,
-            ended=bool(len(before) if before is not None else 0) and not all_before,
+            ended=bool(before is not None and len(before) and (not all_before or anew.any())),
             next_id=next_id + len(fresh),
             **ledger.taken(alive),
         )

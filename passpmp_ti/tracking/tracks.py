@@ -41,7 +41,7 @@ class Tracks:
     owner: tuple[np.ndarray, ...]
     """Per sighting [n] int: the id of the track that each beam's return belongs to; -1: none."""
     ended: bool
-    """A track of the cycle before is gone."""
+    """A track of the cycle before is gone, or has begun anew and may be about somebody else."""
     next_id: int
     """The id that the next track gets."""
 
