@@ -9,7 +9,14 @@ import numpy as np
 import pytest
 
 import passpmp_ti as pti
+import passpmp_ti.grid.model as model_module
 from passpmp_ti import device
+from passpmp_ti.grid import tubes
+from passpmp_ti.grid.reused import Reused
+from passpmp_ti.grid.view import labels_of, views_of
+from passpmp_ti.kernels import beams
+from passpmp_ti.kernels.arrival import NEVER
+from passpmp_ti.planner import plan as plan_module
 from passpmp_ti.sim.episode import simulate
 
 ROBOT = pti.DifferentialDrive()
@@ -19,7 +26,7 @@ def settings_of(mode, **changes):
     return pti.Settings.for_robot(ROBOT, mode=mode, cell=0.1, **changes)
 
 
-def scan_at(stamp=0.0, moving=None, person=None):
+def scan_at(stamp=0.0, person=None):
     """A room of 8 x 8 m about the origin with a pillar, and perhaps somebody in it."""
     beams = 720
     angle = 2 * np.pi * np.arange(beams) / beams - np.pi
@@ -217,3 +224,93 @@ def test_arrays_apart_from_the_host_drive_the_same(mode):
         assert one.risk == pytest.approx(other.risk, abs=1e-4)
     assert any(r.decision == "new" for r in at_home[1:])
     assert len(at_home[-1].model.tracks)
+
+
+def remembered(monkeypatch, persons):
+    """For each cycle, whether a track ended, and whether the hidden set was told of a memory."""
+    told, model, found = [], None, []
+    real = model_module.proven
+
+    def proven(ground, memory, owners=None):
+        told.append(memory is not None)
+        return real(ground, memory, owners)
+
+    monkeypatch.setattr(model_module, "proven", proven)
+    for k, person in enumerate(persons):
+        scan = scan_at(0.1 * k, person=person)
+        model = model_of(settings_of("probabilistic"), scan, model)
+        found.append((model.tracks.ended, told.pop()))
+        assert not told
+    return found
+
+
+def test_memory_is_dropped_when_whoever_was_tracked_may_be_anywhere(monkeypatch):
+    found = remembered(monkeypatch, [(-2.0, 0.5)] * 4 + [None] * 8)
+    assert sum(ended for ended, _ in found) == 1
+    assert [told for _, told in found[1:]] == [not ended for ended, _ in found[1:]]
+
+
+def test_a_track_that_is_met_again_may_be_about_somebody_else(monkeypatch):
+    there = (-2.0, 0.5)
+    found = remembered(monkeypatch, [there] * 4 + [None] + [there] * 2)
+    assert not any(ended for ended, _ in found)
+    assert [told for _, told in found] == [False, True, True, True, True, False, True]
+
+
+def test_between_two_movers_the_way_out_stays_open():
+    settings, scan = settings_of("hybrid"), scan_at(person=(-2.0, 0.5))
+    labels = labels_of([scan], settings, (0.0, 0.0), [9.0], None)
+    person = labels.met[0] == beams.MOVABLE
+    assert person.sum() > 8
+
+    def shut(owner):
+        views = views_of(labels, (), settings, (0.0, 0.0), None, [owner])
+        return views.far_side[0, : len(person)] == beams.SHUT
+
+    one = np.where(person, 7, -1)
+    two = np.where(person & (np.arange(len(person)) > np.flatnonzero(person).mean()), 8, one)
+    inside = person & np.roll(person, -1)
+    assert shut(one)[inside].all()
+    assert not shut(one)[person & ~inside].any()  # the step at his side
+    assert (shut(one) & ~shut(two)).sum() == 1
+    assert not shut(np.full(len(person), -1))[inside].any()
+
+
+def test_what_is_seen_and_not_tracked_is_there_for_sure():
+    settings = settings_of("probabilistic", emergence=0.01)
+    window = model_of(settings, scan_at()).window
+    laid = tubes.Laid(window, 0.0, 0.0, ROBOT, settings)
+    never = np.full((window.size, window.size), NEVER, dtype=np.uint16)
+    place = np.array([[1.0, -0.5]])
+    free, asked = laid.slowed(never, np.zeros((0, 2))), laid.slowed(never, place)
+    cell = np.floor((place[0] - np.array(window.origin)) / window.cell).astype(int)
+    assert asked[cell[1], cell[0]] == 0 < free[cell[1], cell[0]]
+    away = asked[cell[1], cell[0] + 15] / 1000 * settings.object_speed
+    assert 1.5 - settings.clearance(ROBOT) - 0.3 < away < 1.5 - settings.clearance(ROBOT)
+
+
+def test_the_calmest_way_is_the_one_of_least_risk_then_the_clearest(monkeypatch):
+    model = model_of(settings_of("probabilistic"), scan_at())
+    root = np.array([0.0, 0.0, 0.0, 0.5, 0.5])
+    held = plan_module.braking_from(model, root, 0.1, 0)
+    assert plan_module.calmest(model, held, root, 0.1) is held
+    risks = iter([0.5, 0.4, *[0.6] * 20])
+    monkeypatch.setattr(plan_module, "risk_of", lambda *_: next(risks))
+    chosen = plan_module.calmest(model, held, root, 0.1)
+    assert chosen is not held
+    assert (chosen.states == plan_module.braking_from(model, root, 0.1, 0).states).all()
+
+
+def test_memory_is_handed_out_again_when_nobody_holds_it():
+    memory = Reused()
+    first = memory.floats(1000)
+    first[:] = 1.0
+    place = first.ctypes.data
+    second = memory.floats(1000)
+    second[:] = 2.0
+    assert second.ctypes.data != place
+    assert (first == 1.0).all()
+    del first
+    third = memory.floats(900)
+    assert third.ctypes.data == place
+    assert (second == 2.0).all()
