@@ -146,10 +146,10 @@ def test_exploration_ends_when_the_reserve_begins(clock, monkeypatch):
     told = []
     really = TreeGrower.grow
 
-    def grow(self, *given, until):
+    def grow(self, *given, until, weight):
         told.append(until - clock.now)
         clock.now = until + 1e-3
-        return really(self, *given, until=until)
+        return really(self, *given, until=until, weight=weight)
 
     monkeypatch.setattr(TreeGrower, "grow", grow)
     navigator.update(scan_at(REST, 5.0), REST)
@@ -164,9 +164,9 @@ def test_after_a_slow_choice_more_is_kept_back(clock, monkeypatch):
     told = []
     really = TreeGrower.grow
 
-    def grow(self, *given, until):
+    def grow(self, *given, until, weight):
         told.append(until - clock.now)
-        return really(self, *given, until=until)
+        return really(self, *given, until=until, weight=weight)
 
     monkeypatch.setattr(TreeGrower, "grow", grow)
     taking(monkeypatch, clock, Swarm, "choose", 0.018)
