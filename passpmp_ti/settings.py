@@ -75,8 +75,8 @@ class Settings:
     time_step: float = 0.02
     """Time between the samples at which motions are checked [s]; a whole number of ms."""
     layer_length: float = 0.1
-    """Length of a layer of `FutureModel.layers` [s], and the least time between the moments at which
-    tracked movers are forecast; arrival times are kept to 1 ms whatever this is."""
+    """Length of a layer of `FutureModel.layers` [s], and the least time between the moments at
+    which tracked movers are forecast; arrival times are kept to 1 ms whatever this is."""
 
     # the cycle and the tree
     cycle: float = 0.1
