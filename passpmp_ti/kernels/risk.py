@@ -364,30 +364,6 @@ def risk_of(odds: ti.template(), tally: ti.template(), risk):
 
 
 @ti.func
-def risk_end(
-    kind: ti.template(),
-    numbers: ti.template(),
-    counts: ti.template(),
-    layers: ti.template(),
-    grids: ti.template(),
-    begins: ti.template(),
-    starts: ti.template(),
-    odds: ti.template(),
-    tally: ti.template(),
-    q,
-    tick,
-    risk,
-):
-    """The chance that anything touches the robot by the time that it is at q."""
-    whole = risk
-    if not at_rest(kind, q):
-        whole[TOUCH] += 0.5 * touched_now(
-            numbers, counts, layers, grids, begins, starts, odds, q, tick
-        )
-    return risk_of(odds, tally, whole)
-
-
-@ti.func
 def least_braking_risk(
     kind: ti.template(),
     arrival: ti.template(),

@@ -325,7 +325,7 @@ class Navigator:
         budget.lap("bookkeeping")
         return replace(
             record, decision=decision, reason="" if decision == "new" else reason, tree=tree,
-            risk=risk_of(model, chosen, start),
+            risk=record.held_risk if decision == "held" else risk_of(model, chosen, start),
             tree_nodes=tree.count, tree_depth=tree.depth, tree_stopped_by=tree.stopped_by,
             cost=cost_new if decision == "new" else cost_held, cost_new=cost_new,
             cost_held=cost_held,

@@ -35,30 +35,27 @@ def brake_at_once(model: FutureModel, state: np.ndarray, start: float) -> Trajec
     proof = int(model.proving_brakes(state[None], np.array([start]))[0])
     if proof >= 0:
         return braking_from(model, state, start, proof)
-    brakes = [braking_from(model, state, start, k) for k in range(len(model.body.braking))]
-    touches = [touched(model, brake) for brake in brakes]
-    clear_until = [
-        float(brake.times[np.argmax(taken)]) if taken.any() else np.inf
-        for brake, taken in zip(brakes, touches, strict=True)
-    ]
-    return brakes[int(np.argmax(clear_until))]
+    brakes = _every_brake(model, state, start)
+    return max(brakes, key=lambda brake: _clear_until(model, brake, start))
 
 
-def calmest(
-    model: FutureModel, held: Trajectory, root: np.ndarray, start: float
-) -> Trajectory:
+def calmest(model: FutureModel, held: Trajectory, root: np.ndarray, start: float) -> Trajectory:
     """Of what is held, and of braking from `root` [5] at `start` [s] by each control: what has the
     least risk, and of equals what stays clear longest; the held one of those."""
-    state = model.robot.within_limits(root)
-    ways = [held] + [
-        braking_from(model, state, start, k) for k in range(len(model.body.braking))
-    ]
-    clear = []
-    for way in ways:
-        taken = _touched_since(model, way, start)
-        clear.append(float(way.times[np.argmax(taken)]) if taken.any() else np.inf)
-    risks = [risk_of(model, way, start) for way in ways]
-    return ways[min(range(len(ways)), key=lambda k: (risks[k], -clear[k], k))]
+    ways = [held, *_every_brake(model, model.robot.within_limits(root), start)]
+    return min(ways, key=lambda way: (risk_of(model, way, start), -_clear_until(model, way, start)))
+
+
+def _every_brake(model: FutureModel, state: np.ndarray, start: float) -> list[Trajectory]:
+    """Braking at once from `state` [5] at `start` [s] by each control of the braking set."""
+    return [braking_from(model, state, start, k) for k in range(len(model.body.braking))]
+
+
+def _clear_until(model: FutureModel, way: Trajectory, since: float) -> float:
+    """When something could first touch the robot on a way, asked about from `since` on [s]; inf:
+    nothing can."""
+    taken = _touched_since(model, way, since)
+    return float(way.times[np.argmax(taken)]) if taken.any() else math.inf
 
 
 def allowed_brake(model: FutureModel, root: np.ndarray, start: float) -> tuple[int, float]:
@@ -116,12 +113,6 @@ def still_clear(model: FutureModel, trajectory: Trajectory, since: float = -np.i
     A second opinion on the whole path, not a new proof at other times.
     """
     return not _touched_since(model, trajectory, since).any()
-
-
-def touched(model: FutureModel, trajectory: Trajectory) -> np.ndarray:
-    """[m] bool: samples from which on something could touch the moving robot, by the look-ups that
-    verified it."""
-    return model.touched(trajectory.states, trajectory.times)
 
 
 def _as_trajectory(

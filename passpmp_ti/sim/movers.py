@@ -97,3 +97,10 @@ class NoMovers(PathMovers):
 
     def __init__(self) -> None:
         super().__init__((), np.zeros(0))
+
+
+def stretched(
+    paths: tuple[tuple[tuple[float, float, float], ...], ...], factor: float
+) -> tuple[tuple[tuple[float, float, float], ...], ...]:
+    """Rows (t, x, y) of paths [s, m, m], gone along in `factor` times the time."""
+    return tuple(tuple((t * factor, x, y) for t, x, y in path) for path in paths)

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from passpmp_ti.sim.movers import Movers, PathMovers
+from passpmp_ti.sim.movers import Movers, PathMovers, stretched
 from passpmp_ti.sim.world import World
 
 
@@ -84,6 +84,4 @@ class PatrolSource:
         """
         if top_speed <= 0:
             raise ValueError("movers on patrol cannot be stopped; write them as type: scripted")
-        stretch = self.top_speed / top_speed
-        paths = tuple(tuple((t * stretch, x, y) for t, x, y in path) for path in self.paths)
-        return replace(self, paths=paths)
+        return replace(self, paths=stretched(self.paths, self.top_speed / top_speed))

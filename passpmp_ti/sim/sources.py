@@ -9,7 +9,7 @@ from typing import Protocol
 
 import numpy as np
 
-from passpmp_ti.sim.movers import Movers, NoMovers, PathMovers
+from passpmp_ti.sim.movers import Movers, NoMovers, PathMovers, stretched
 from passpmp_ti.sim.recordings import Recording, recorded_movers
 from passpmp_ti.sim.splines import draw_spline_movers
 from passpmp_ti.sim.world import Bounds, World
@@ -133,10 +133,7 @@ class ScriptSource:
         if top_speed <= 0:
             stood = tuple((path[0],) for path in self.paths)
             return replace(self, paths=stood)
-        stretch = now / top_speed
-        return replace(
-            self, paths=tuple(tuple((t * stretch, x, y) for t, x, y in p) for p in self.paths)
-        )
+        return replace(self, paths=stretched(self.paths, now / top_speed))
 
 
 @dataclass(frozen=True, kw_only=True)
