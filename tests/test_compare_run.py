@@ -115,7 +115,10 @@ def test_the_observer_does_not_prove_what_nothing_speaks_for():
         np.array([0.0, 1.0]), np.array([state, [2.0, 0.0, 0.0, 0.0, 0.0]]), 1
     )
     scan = Scan(np.full(180, 1.2), -np.pi, 2 * np.pi / 180, 6.0, pose=(0, 0, 0), stamp=0.0)
-    navigator = SimpleNamespace(robot=chair, settings=settings, static_map=None, held=held)
+    own = SimpleNamespace(model=None)
+    navigator = SimpleNamespace(
+        robot=chair, settings=settings, static_map=None, held=held, record=own
+    )
     observer = Observer()
     observer.see(
         SimpleNamespace(time=0.0, state=state, scans=[scan], navigator=navigator, executing=held)

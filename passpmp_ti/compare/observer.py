@@ -27,14 +27,11 @@ class Observer:
     def see(self, info: CycleInfo) -> None:
         """Judge one cycle of `simulate`."""
         navigator = info.navigator
-        changes: dict[str, object] = {"mode": "conservative"}
-        if self._model is not None:
-            changes["clear_radius"] = 0.0  # declared of the start, and of nowhere else
-        x, y, theta = (float(v) for v in info.state[:3])
-        self._model = FutureModel.from_scan(
-            info.scans, navigator.robot, navigator.settings.changed(**changes), self._model,
-            navigator.static_map, position=(x, y, theta),
-        )  # fmt: skip
+        own = navigator.record.model
+        if navigator.settings.mode == "conservative" and own is not None:
+            self._model = own  # the same scans, the same memory: the strict model is at hand
+        else:
+            self._model = self._built(info)
         start = info.time + navigator.settings.cycle
         root = navigator.robot.within_limits(info.executing.at(start))
         moving = not bool(navigator.robot.at_rest(root))
@@ -45,6 +42,18 @@ class Observer:
         self.proven += proven
         self.cycles_moving += moving
         self.proven_moving += moving and proven
+
+    def _built(self, info: CycleInfo) -> FutureModel:
+        """The strict model of this cycle, with the memory of those before."""
+        navigator = info.navigator
+        changes: dict[str, object] = {"mode": "conservative"}
+        if self._model is not None:
+            changes["clear_radius"] = 0.0  # declared of the start, and of nowhere else
+        x, y, theta = (float(v) for v in info.state[:3])
+        return FutureModel.from_scan(
+            info.scans, navigator.robot, navigator.settings.changed(**changes), self._model,
+            navigator.static_map, position=(x, y, theta),
+        )  # fmt: skip
 
     def counts(self) -> dict[str, int]:
         """What was seen, for JSON."""
