@@ -31,6 +31,9 @@ WIDE = 4.5
 MOST_NODES = 4_000_000
 """Nodes of all windows of one forecast: 96 MB."""
 WORKERS = 256
+STRIP, STRIP_ON_DEVICE = 16, 2
+"""Nodes that a thread lays in one go: what is common to them is worked out once, and a device has
+more threads than a CPU."""
 RING_ERROR = 1e-3
 """Bound on the relative error of the integrals over a ring, see `points_of`."""
 ROUNDING = 1e-4
@@ -298,7 +301,10 @@ def laid(
     begins = np.stack([np.cumsum(nodes) - nodes, *moments.sides], -1).astype(np.int32)
     layers = _memory.floats(int(nodes.sum()) * KINDS)
     there = device.put(begins)
-    lay_hazard(rows, places, near, pool, tally, grids, there, int(nodes.max()), layers)
+    strip = STRIP_ON_DEVICE if device.resident() else STRIP
+    lay_hazard(
+        rows, places, near, pool, tally, grids, there, int(moments.sides.max()), strip, layers
+    )
     return layers, there
 
 

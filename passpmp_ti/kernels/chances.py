@@ -55,6 +55,8 @@ Numbers = ti.types.ndarray(dtype=ti.f32, ndim=1)
 vec2 = ti.types.vector(2, ti.f32)
 channels6 = ti.types.vector(CHANNELS, ti.f32)
 flow8 = ti.types.vector(8, ti.f32)
+window22 = ti.types.vector(22, ti.f32)
+place3 = ti.types.vector(3, ti.i32)
 lanes = ti.types.vector(LANES, ti.f32)
 
 ERROR_OF_CHORDS = 4e-7
@@ -232,20 +234,28 @@ def rasterise_windows(
 
 
 @ti.func
-def values_at(places: ti.template(), pool: ti.template(), rows: ti.template(), row, x, y):
+def window_of(rows: ti.template(), places: ti.template(), row):
+    """(row, place) of one window: read once where many places ask for it."""
+    window = window22(0.0)
+    for r in ti.static(range(22)):
+        window[r] = rows[row, r]
+    return window, place3(places[row, 0], places[row, 1], places[row, 2])
+
+
+@ti.func
+def values_at(window: window22, place: place3, pool: ti.template(), x, y):
     """[6] channels of one window at (x, y) in its frame; 0 where nothing is."""
     value = channels6(0.0)
-    if places[row, 0] >= 0 and ti.abs(x) < rows[row, 6] and ti.abs(y) < rows[row, 7]:
+    if place[0] >= 0 and ti.abs(x) < window[6] and ti.abs(y) < window[7]:
         # beyond the last node all falls: its value bounds what is there
-        nodes_y = places[row, 2]
-        fx = ti.min(ti.abs(x) * rows[row, 4], places[row, 1] - 1.001)
-        fy = ti.min(ti.abs(y) * rows[row, 5], nodes_y - 1.001)
+        fx = ti.min(ti.abs(x) * window[4], place[1] - 1.001)
+        fy = ti.min(ti.abs(y) * window[5], place[2] - 1.001)
         i = ti.cast(fx, ti.i32)
         j = ti.cast(fy, ti.i32)
         fx -= i
         fy -= j
-        at = (places[row, 0] + i * nodes_y + j) * CHANNELS
-        right = at + nodes_y * CHANNELS
+        at = (place[0] + i * place[2] + j) * CHANNELS
+        right = at + place[2] * CHANNELS
         for r in ti.static(range(CHANNELS)):
             low = pool[at + r] + fy * (pool[at + CHANNELS + r] - pool[at + r])
             high = pool[right + r] + fy * (pool[right + CHANNELS + r] - pool[right + r])
@@ -260,24 +270,24 @@ def values_at(places: ti.template(), pool: ti.template(), rows: ti.template(), r
 
 
 @ti.func
-def flow_parts(rows: ti.template(), places: ti.template(), pool: ti.template(), row, p: vec2):
+def parts_at(window: window22, place: place3, pool: ti.template(), p: vec2):
     """[8] M, G, q, rest and P of one window about its own mean, as kernels/hazard.py sums them."""
-    c = rows[row, 2]
-    s = rows[row, 3]
-    dx = p[0] - rows[row, 0]
-    dy = p[1] - rows[row, 1]
+    c = window[2]
+    s = window[3]
+    dx = p[0] - window[0]
+    dy = p[1] - window[1]
     x = c * dx + s * dy
     y = c * dy - s * dx
-    value = values_at(places, pool, rows, row, x, y)
+    value = values_at(window, place, pool, x, y)
     # mean velocity at p, and what all of the ring has on top of it, outwards
-    wx = rows[row, 8] + rows[row, 10] * x + rows[row, 11] * y
-    wy = rows[row, 9] + rows[row, 12] * x + rows[row, 13] * y
-    outwards = rows[row, 14]
+    wx = window[8] + window[10] * x + window[11] * y
+    wy = window[9] + window[12] * x + window[13] * y
+    outwards = window[14]
     touch, xx, yy, xy, gx, gy = value[0], value[1], value[2], value[3], value[4], value[5]
     flow_x = xx * wx + xy * wy + outwards * gx
     flow_y = xy * wx + yy * wy + outwards * gy
     q = wx * flow_x + wy * flow_y + outwards * (wx * gx + wy * gy + outwards * (xx + yy))
-    q += rows[row, 16] * xx + 2.0 * rows[row, 17] * xy + rows[row, 18] * yy
+    q += window[16] * xx + 2.0 * window[17] * xy + window[18] * yy
     cc = c * c
     ss = s * s
     cs = c * s
@@ -288,9 +298,16 @@ def flow_parts(rows: ti.template(), places: ti.template(), pool: ti.template(), 
         c * flow_x - s * flow_y,
         s * flow_x + c * flow_y,
         ti.max(q, 0.0),
-        rows[row, 15] * (xx + yy),
+        window[15] * (xx + yy),
         touch,
     )
+
+
+@ti.func
+def flow_parts(rows: ti.template(), places: ti.template(), pool: ti.template(), row, p: vec2):
+    """`parts_at` of the window of a row."""
+    window, place = window_of(rows, places, row)
+    return parts_at(window, place, pool, p)
 
 
 @ti.func

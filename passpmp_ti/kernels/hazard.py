@@ -23,7 +23,7 @@ Shared parameters, beside those of kernels/chances.py:
 
 import taichi as ti
 
-from passpmp_ti.kernels.chances import flow_parts, is_near, moment_of, vec2
+from passpmp_ti.kernels.chances import moment_of, parts_at, vec2, window_of
 from passpmp_ti.kernels.launch import kernel
 from passpmp_ti.kernels.spread import spread, spread_over
 
@@ -50,34 +50,76 @@ def lay_hazard(
     tally: Counts,
     grids: Table,
     begins: Links,
-    most: ti.i32,  # nodes of the widest layer
+    most: ti.i32,  # nodes along the longest side of a layer
+    strip: ti.i32,  # nodes side by side that one thread lays in one go
     # out
     layers: Numbers,
 ):
+    strips = (most + strip - 1) // strip
     # late layers have more in them than early ones
-    pieces = begins.shape[0] * most
+    pieces = begins.shape[0] * most * strips
     for task in range(spread_over(pieces)):
         index = spread(task, pieces)
-        j = ti.min(index // most, begins.shape[0] - 1)
-        node = index % most
+        j = ti.min(index // (most * strips), begins.shape[0] - 1)
+        line = index % (most * strips) // strips
+        first = index % strips * strip
         columns = begins[j, 1]
-        if index < pieces and node < columns * begins[j, 2]:
-            p = vec2(node % columns, node // columns) * grids[j, 3]
-            p += vec2(grids[j, 0], grids[j, 1])
-            total = kinds8(0.0)
+        last = ti.min(first + strip, columns)
+        if index < pieces and line < begins[j, 2] and first < last:
+            side = grids[j, 3]
+            left = grids[j, 0]
+            y = line * side + grids[j, 1]
+            start = (begins[j, 0] + line * columns) * KINDS
+            for at in range(start + first * KINDS, start + last * KINDS):
+                layers[at] = 0.0
             # farther than a cell from where the robot may be, no look asks for a node
-            off = p - vec2(grids[j, 6], grids[j, 7])
-            reach = ti.sqrt(grids[j, 8]) + 1.5 * grids[j, 3]
-            objects = ti.select(off.dot(off) < reach * reach, tally[0], 0)
+            reach = ti.sqrt(grids[j, 8]) + 1.5 * side
+            begin, end = columns_within(
+                left, grids[j, 2], first, last, grids[j, 6], y - grids[j, 7], reach * reach
+            )
+            objects = ti.select(begin < end, tally[0], 0)
             for n in range(objects):
-                if is_near(near, j * tally[0] + n, p):
-                    for c in range(tally[1]):
-                        row = (j * tally[0] + n) * tally[1] + c
-                        total += (
-                            rows[row, 20] * rows[row, 21] * flow_parts(rows, places, pool, row, p)
-                        )
-            for r in ti.static(range(KINDS)):
-                layers[(begins[j, 0] + node) * KINDS + r] = total[r]
+                of = j * tally[0] + n
+                off = y - near[of, 1]
+                components = ti.select(ti.abs(off) < near[of, 2], tally[1], 0)
+                for c in range(components):
+                    row = of * tally[1] + c
+                    window, place = window_of(rows, places, row)
+                    # the greater deviation reaches farthest
+                    farthest = window[6] * window[6]
+                    low, high = columns_within(
+                        left, grids[j, 2], begin, end, window[0], y - window[1],
+                        ti.select(place[0] >= 0, farthest, -1.0),
+                    )  # fmt: skip
+                    weight = window[20] * window[21]
+                    for i in range(low, high):
+                        part = parts_at(window, place, pool, vec2(i * side + left, y))
+                        for r in ti.static(range(KINDS)):
+                            # not +=, which is atomic: nobody else writes here
+                            at = start + i * KINDS + r
+                            layers[at] = layers[at] + weight * part[r]
+
+
+@ti.func
+def columns_within(left, density, first, last, x, off, square):
+    """(begin, end) of the columns of [first, last) whose nodes a disc may hold, in a line of nodes.
+
+    Args:
+        left: of column 0 [m].
+        density: nodes a metre.
+        x: middle of the disc [m].
+        off: how far from it the line runs [m].
+        square: of the disc's radius [m^2].
+    """
+    begin = first
+    end = first
+    room = square - off * off
+    if room > 0.0:
+        half = ti.sqrt(room)
+        # a column more on either side, for rounding
+        begin = ti.cast(ti.max((x - half - left) * density - 1.0, first * 1.0), ti.i32)
+        end = ti.cast(ti.min((x + half - left) * density + 2.0, last * 1.0), ti.i32)
+    return begin, end
 
 
 @ti.func

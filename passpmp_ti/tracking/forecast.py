@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import InitVar, dataclass
 
 import numpy as np
 
@@ -27,8 +27,12 @@ class Forecast:
     """[N, C, L, 4, 4]."""
     radius: np.ndarray
     """[N] disc about a track's centre that covers its object [m]."""
+    trusted: InitVar[bool] = False
+    """Whether the values were worked out here: they are not looked through once more."""
 
-    def __post_init__(self) -> None:
+    def __post_init__(self, trusted: bool) -> None:
+        if trusted:
+            return
         name = "Forecast"
         times = door.array(name, "times", self.times, (None,))
         weight = door.array(name, "weight", self.weight, (None, None))
@@ -55,7 +59,6 @@ class Forecast:
         ):
             value.setflags(write=False)
             object.__setattr__(self, field_, value)
-
 
     def reduced(self) -> Forecast:
         """Each track of three components as two: the pair that loses least by it becomes one
@@ -86,8 +89,9 @@ class Forecast:
                 both, self.mean[mine][:, pair], self.covariance[mine][:, pair]
             )
         return Forecast(
-            times=self.times, weight=weight, mean=mean, covariance=covariance, radius=self.radius
-        )
+            times=self.times, weight=weight, mean=mean, covariance=covariance, radius=self.radius,
+            trusted=True,
+        )  # fmt: skip
 
     def _lost(
         self, mean: np.ndarray, covariance: np.ndarray, spread: np.ndarray, pair: tuple[int, int]
