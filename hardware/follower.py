@@ -24,7 +24,7 @@ class FollowerSettings:
     across: float = 12.0
     """Turn for each metre beside the path and metre of way, at low speed [1/m^2]."""
     swing: float = 3.5
-    """Fastest that it swings back to the path [rad/s]: `across` is less where it would be faster."""
+    """Fastest that it swings back to the path [rad/s]; `across` is less where that asks for it."""
     turning: float = 5.0
     """Turn rate for each radian that the heading is off [1/s]."""
     most: float = 0.4

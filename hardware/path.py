@@ -55,8 +55,9 @@ class Path:
         t, u = self._times[after - 1], self._times[after]
         a, b = self._states[after - 1], self._states[after]
         share = (time - t) / (u - t)
-        between = [p + share * (q - p) for p, q in zip(a, b, strict=True)]
-        return Place(*between, (b[3] - a[3]) / (u - t), (b[4] - a[4]) / (u - t))
+        x, y, theta, right, left = (p + share * (q - p) for p, q in zip(a, b, strict=True))
+        rates = (b[3] - a[3]) / (u - t), (b[4] - a[4]) / (u - t)
+        return Place(x, y, theta, right, left, *rates)
 
 
 def gap(a: Place, b: Place) -> tuple[float, float, float]:
