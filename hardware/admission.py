@@ -23,6 +23,11 @@ def judge(trajectory: Trajectory, robot: DifferentialDrive) -> Verdict:
     That it is safe is the planner's word. What is asked here is what a planner gone wrong would
     send: numbers that are none, a motion without rest, a jump.
     """
+    with np.errstate(all="ignore"):  # numbers so great that their differences are none
+        return _judge(trajectory, robot)
+
+
+def _judge(trajectory: Trajectory, robot: DifferentialDrive) -> Verdict:
     times, states = trajectory.times, trajectory.states
     if not (np.isfinite(times).all() and np.isfinite(states).all()) or states[-1, 3:].any():
         return Verdict.NOT_WHOLE
@@ -34,12 +39,13 @@ def judge(trajectory: Trajectory, robot: DifferentialDrive) -> Verdict:
     means = 0.5 * (wheels[1:] + wheels[:-1])
     ways = np.hypot(*np.diff(states[:, :2], axis=0).T)
     turns = np.diff(states[:, 2])
-    if (
-        (steps > LONGEST_STEP).any()
-        or (np.abs(wheels) > limit * SLACK).any()
-        or (changes > robot.acceleration * SLACK * steps[:, None] + LEEWAY[2]).any()
-        or (ways > np.abs(means.mean(axis=1)) * steps + LEEWAY[0]).any()
-        or (np.abs(turns - (means[:, 0] - means[:, 1]) / robot.track * steps) > LEEWAY[1]).any()
-    ):
-        return Verdict.BEYOND_LIMITS
-    return Verdict.TAKEN
+    turning = (means[:, 0] - means[:, 1]) / robot.track
+    # an overflow compares with nothing: each test asks for what must hold
+    holds = (
+        (steps <= LONGEST_STEP).all()
+        and (np.abs(wheels) <= limit * SLACK).all()
+        and (changes <= robot.acceleration * SLACK * steps[:, None] + LEEWAY[2]).all()
+        and (ways <= np.abs(means.mean(axis=1)) * steps + LEEWAY[0]).all()
+        and (np.abs(turns - turning * steps) <= LEEWAY[1]).all()
+    )
+    return Verdict.TAKEN if holds else Verdict.BEYOND_LIMITS

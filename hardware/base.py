@@ -70,7 +70,10 @@ class Base(Protocol):
         """The newest one; None before any came."""
 
     def stop(self) -> None:
-        """Brake as hard as it can, and stay so whatever `drive` says, until `reset`."""
+        """Brake as hard as it can, and stay so whatever `drive` says, until `reset`.
+
+        This is the executor's. A button on the base itself is let go by hand, not by `reset`.
+        """
 
     def reset(self) -> None:
         """Obey `drive` again."""

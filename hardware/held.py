@@ -140,10 +140,9 @@ class Held:
         self.judged, self.verdict = name, verdict
         return verdict
 
-    def stop(self, reason: Reason = Reason.BUTTON) -> None:
+    def stop(self) -> None:
         """Stop for good."""
-        self.state, self.reason = State.EMERGENCY, reason
-        self._legs = []
+        self._let_go(State.EMERGENCY, Reason.BUTTON)
 
     def reset(self) -> bool:
         """Forget an emergency stop, if the robot is at rest. Whether it did."""
@@ -170,7 +169,7 @@ class Held:
             assert odometry is not None
             self.order = self._follow(odometry, now, since_last)
         else:
-            self.order = self._brake(since_last)
+            self.order = self._brake(since_last, now)
             self._come_to_rest(odometry, now)
         return self.order
 
@@ -201,8 +200,10 @@ class Held:
             return Verdict.LATE
         if trajectory.start > now + s.ahead:
             return Verdict.EARLY
-        start = Place(*trajectory.states[0].tolist())
-        if any(g > j for g, j in zip(gap(self.at(trajectory.start), start), s.join, strict=True)):
+        # it replaces what would have begun at the same time, and must join what goes before that
+        before = [leg for leg in self._legs if leg.since < trajectory.start] or self._legs[:1]
+        ends, start = before[-1].path.at(trajectory.start), Place(*trajectory.states[0].tolist())
+        if any(g > j for g, j in zip(gap(ends, start), s.join, strict=True)):
             return Verdict.DOES_NOT_JOIN
         if sum(leg.since > now for leg in self._legs) >= MOST_WAITING:
             return Verdict.FULL
@@ -246,7 +247,7 @@ class Held:
         if not (math.isfinite(right) and math.isfinite(left)):
             self._let_go(State.BRAKING, Reason.NO_ORDER)
             self._rest_by = now + self._braking_time() + self._settings.rest_late
-            return self._brake(since_last)
+            return self._brake(since_last, now)
         silent = [source for source in Source if self._silent(source, now)]
         if now >= leg.path.end:
             self.state, self.reason = State.RESTING, Reason.NONE
@@ -259,14 +260,16 @@ class Held:
             self.state, self.reason = State.FOLLOWING, Reason.NONE
         return Order(right, left, False)
 
-    def _brake(self, since_last: float) -> Order:
+    def _brake(self, since_last: float, now: float) -> Order:
         """Less than the order before by what the base can do, both wheels in proportion: the
-        robot then keeps to the circle that it is on."""
+        robot then keeps to the circle that it is on. Then the base's own stop too: it stays until
+        it is known where the robot stands."""
         right, left, _ = self.order
         fastest = max(abs(right), abs(left))
         less = self._limits.acceleration * since_last
         share = 0.0 if fastest <= less else 1.0 - less / fastest
-        return Order(share * right, share * left, self.state is State.EMERGENCY)
+        stop = self.state is State.EMERGENCY or now >= self._rest_by
+        return Order(share * right, share * left, stop)
 
     def _braking_time(self) -> float:
         return max(abs(self.order.right), abs(self.order.left)) / self._limits.acceleration
@@ -277,9 +280,6 @@ class Held:
             return
         known = self._trouble(odometry, now) is Reason.NONE
         if self.state is State.BRAKING and now >= self._rest_by:
-            if known and not self._rests(odometry):
-                self.stop(Reason.ROLLING)
-                return
             self.state = State.STOPPED
         if self.state is not State.STOPPED or not known or not self._rests(odometry):
             self._settling_since = None

@@ -6,6 +6,7 @@ import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -16,7 +17,7 @@ STEP = 1e-3
 """[s]; it moves in steps of this."""
 LONGEST_NAP = 2.0
 """[s]; what is at rest and was told nothing for longer has not moved since."""
-FAULTS = ("silent", "nan", "frozen", "jump", "stuck")
+FAULTS = ("silent", "nan", "frozen", "jump", "deaf")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -102,6 +103,9 @@ class SimulatedBase:
             self.refused += 1
             return
         most = self.limits.wheel_speed
+        if self._fault == "deaf":
+            self._told_at = self._now
+            return
         self._wanted = (max(-most, min(most, right)), max(-most, min(most, left)))
         self._told_at = self._now
 
@@ -123,8 +127,8 @@ class SimulatedBase:
 
     def inject(self, fault: str) -> None:
         """From now on: "silent": no odometry comes; "nan": its numbers are none; "frozen": it
-        shows the same place with new stamps; "jump": its place is 1 m off; "stuck": a wheel keeps
-        its speed whatever it is told; "": none of these."""
+        shows the same place with new stamps; "jump": its place is 1 m off; "deaf": its wheels
+        go on as they were told last, until it is told to stop; "": none of these."""
         if fault:
             door.choice("SimulatedBase", "fault", fault, FAULTS)
         self.advance()
@@ -155,8 +159,6 @@ class SimulatedBase:
             self._slip_until = self._now + n.slip_time
         most = n.limits.acceleration * STEP
         for i in (0, 1):
-            if i == 0 and self._fault == "stuck":
-                continue
             wanted = 0.0 if braking else self._wanted[i]
             # who brakes by himself does it by brakes, not by a speed loop
             change = wanted - self._wheels[i]
@@ -191,3 +193,22 @@ class SimulatedBase:
         if self._fault == "jump":
             noisy[0] += 1.0
         self._told = Odometry(self._now, *noisy)
+
+
+def build(
+    *, seed: int = 0, pose: tuple[float, float, float] = (0.0, 0.0, 0.0), **nature: Any
+) -> SimulatedBase:
+    """A base from plain numbers, as a configuration has them.
+
+    Args:
+        seed: of noise and slip.
+        pose: where it stands at first.
+        nature: fields of `BaseNature`; `limits` as a mapping of fields of `BaseLimits`.
+
+    Raises:
+        ValueError: a number out of its range.
+    """
+    if "limits" in nature:
+        nature["limits"] = BaseLimits(**nature["limits"])
+    rng = np.random.default_rng(seed)
+    return SimulatedBase(BaseNature(**nature), rng=rng, pose=pose)

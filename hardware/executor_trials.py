@@ -1,0 +1,135 @@
+"""A planner that plans nothing: random motions, each braked to rest, for trying an executor.
+
+    python -m hardware.executor_trials DIRECTORY --seed 1
+
+It keeps its cycle on the monotonic clock, joins what the executor follows, and can be told, through
+a socket of its own, to go wrong.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import time
+from pathlib import Path
+
+import numpy as np
+
+from hardware.letterbox import Letterbox
+from hardware.link import PlannerLink
+from passpmp_ti.robots import DifferentialDrive
+from passpmp_ti.trajectory import Trajectory
+
+TIME_STEP = 0.01
+"""Of its motions [s]."""
+CYCLE = 0.1
+"""[s]."""
+ORDERS = "planner-orders"
+"""Name of the socket by which it is told to go wrong."""
+WRONGS = ("", "nan", "clock", "frozen")
+
+
+def motion(
+    robot: DifferentialDrive, state: np.ndarray, start: float, rng: np.random.Generator
+) -> Trajectory:
+    """A random motion within the robot's limits, then braking in proportion, to rest.
+
+    Args:
+        robot: whose.
+        state: [5] where it begins.
+        start: when [s].
+        rng: decides what it is.
+    """
+    states = [np.array(state, dtype=np.float64)]
+    a, top = robot.acceleration, robot.wheel_speed
+    for _ in range(int(rng.integers(1, 4))):
+        rates = rng.choice([a, 0.0, -a], 2, p=[0.5, 0.3, 0.2])
+        for _ in range(int(rng.integers(10, 50))):
+            wheels = np.clip(states[-1][3:] + rates * TIME_STEP, -top, top)
+            states.append(_moved(robot, states[-1], wheels))
+    brakes_from = len(states) - 1
+    wheels = states[-1][3:]
+    steps = math.ceil(np.abs(wheels).max() / (a * TIME_STEP))
+    for n in range(steps - 1, -1, -1):
+        states.append(_moved(robot, states[-1], wheels * (n / steps)))
+    times = start + TIME_STEP * np.arange(len(states))
+    return Trajectory(times, np.array(states), brakes_from)
+
+
+def _moved(robot: DifferentialDrive, state: np.ndarray, wheels: np.ndarray) -> np.ndarray:
+    """A step of the midpoint rule, to a state with these wheel speeds (eq. 23)."""
+    right, left = 0.5 * (state[3:] + wheels)
+    turn = (right - left) / robot.track * TIME_STEP
+    way, heading = 0.5 * (right + left) * TIME_STEP, state[2] + 0.5 * turn
+    return np.array(
+        [
+            state[0] + way * math.cos(heading),
+            state[1] + way * math.sin(heading),
+            state[2] + turn,
+            *wheels,
+        ]
+    )
+
+
+class Rover:
+    """Drives about through a `PlannerLink`, a motion each cycle."""
+
+    def __init__(
+        self, link: PlannerLink, robot: DifferentialDrive, rng: np.random.Generator
+    ) -> None:
+        self.wrong = ""
+        """How it goes wrong: "nan": its motions hold a number that is none; "clock": its clock
+        is off by seconds or hours; "frozen": the sensor's newest scan stays the same."""
+        self._link, self._robot, self._rng = link, robot, rng
+        self._scan = -math.inf
+        self._shift = 0.0
+
+    def cycle(self, now: float) -> None:
+        """One cycle, at `now` [s]."""
+        self._link.poll(timeout=0.5 * CYCLE)
+        if self.wrong == "clock" and not self._shift:
+            size = 10.0 ** self._rng.uniform(0.0, 4.0)
+            self._shift = float(self._rng.choice([-1.0, 1.0])) * size
+        elif self.wrong != "clock":
+            self._shift = 0.0
+        if self.wrong != "frozen":
+            self._scan = now
+        self._link.beat(self._scan + self._shift)
+        following = self._link.following
+        if following is None:
+            return
+        start = now + CYCLE
+        planned = motion(self._robot, following.at(start), start, self._rng)
+        states, times = planned.states, planned.times + self._shift
+        if self.wrong == "nan":
+            states = states.copy()
+            # not the last one, which a look at the end alone would find
+            states[self._rng.integers(len(states)), self._rng.integers(5)] = math.nan
+        self._link.offer(Trajectory(times, states, planned.brakes_from))
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(
+        description="Drive an executor about at random.",
+        epilog="example: python -m hardware.executor_trials /run/passpmp --seed 1",
+    )
+    parser.add_argument("directory", type=Path, help="of the executor's sockets")
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--wheel-speed", type=float, default=1.5, help="[m/s]")
+    given = parser.parse_args()
+    robot = DifferentialDrive(wheel_speed=given.wheel_speed)
+    orders = Letterbox(given.directory / ORDERS)
+    with PlannerLink(given.directory, track=robot.track) as link:
+        rover = Rover(link, robot, np.random.default_rng(given.seed))
+        due = time.monotonic()
+        while True:
+            for order, _ in orders.collect():
+                rover.wrong = order.decode()
+            rover.cycle(time.monotonic())
+            # a cycle that was slept through is not made up for
+            due = max(due + CYCLE, time.monotonic() - CYCLE)
+            time.sleep(max(due - time.monotonic(), 0.0))
+
+
+if __name__ == "__main__":
+    main()
