@@ -71,41 +71,54 @@ def _moved(robot: DifferentialDrive, state: np.ndarray, wheels: np.ndarray) -> n
     )
 
 
+class SteppedClock:
+    """A monotonic clock that can be stepped, as none should."""
+
+    def __init__(self) -> None:
+        self.step = 0.0
+        """[s]."""
+
+    def __call__(self) -> float:
+        return time.monotonic() + self.step
+
+
 class Rover:
     """Drives about through a `PlannerLink`, a motion each cycle."""
 
     def __init__(
-        self, link: PlannerLink, robot: DifferentialDrive, rng: np.random.Generator
+        self,
+        link: PlannerLink,
+        robot: DifferentialDrive,
+        rng: np.random.Generator,
+        clock: SteppedClock,
     ) -> None:
         self.wrong = ""
-        """How it goes wrong: "nan": its motions hold a number that is none; "clock": its clock
-        is off by seconds or hours; "frozen": the sensor's newest scan stays the same."""
-        self._link, self._robot, self._rng = link, robot, rng
+        """How it goes wrong, one of `WRONGS`: "nan": its motions hold a number that is none;
+        "clock": its clock is off by seconds or hours; "frozen": the newest scan stays the same."""
+        self._link, self._robot, self._rng, self._clock = link, robot, rng, clock
         self._scan = -math.inf
-        self._shift = 0.0
 
-    def cycle(self, now: float) -> None:
-        """One cycle, at `now` [s]."""
+    def cycle(self) -> None:
+        """One cycle, now."""
         self._link.poll(timeout=0.5 * CYCLE)
-        if self.wrong == "clock" and not self._shift:
+        if self.wrong != "clock":
+            self._clock.step = 0.0
+        elif not self._clock.step:
             size = 10.0 ** self._rng.uniform(0.0, 4.0)
-            self._shift = float(self._rng.choice([-1.0, 1.0])) * size
-        elif self.wrong != "clock":
-            self._shift = 0.0
+            self._clock.step = float(self._rng.choice([-1.0, 1.0])) * size
+        now = self._clock()
         if self.wrong != "frozen":
             self._scan = now
-        self._link.beat(self._scan + self._shift)
+        self._link.beat(self._scan)
         following = self._link.following
         if following is None:
             return
         start = now + CYCLE
         planned = motion(self._robot, following.at(start), start, self._rng)
-        states, times = planned.states, planned.times + self._shift
         if self.wrong == "nan":
-            states = states.copy()
-            # not the last one, which a look at the end alone would find
-            states[self._rng.integers(len(states)), self._rng.integers(5)] = math.nan
-        self._link.offer(Trajectory(times, states, planned.brakes_from))
+            row, column = self._rng.integers(len(planned.states)), self._rng.integers(5)
+            planned.states[row, column] = math.nan
+        self._link.offer(planned)
 
 
 def main() -> None:
@@ -119,13 +132,14 @@ def main() -> None:
     given = parser.parse_args()
     robot = DifferentialDrive(wheel_speed=given.wheel_speed)
     orders = Letterbox(given.directory / ORDERS)
-    with PlannerLink(given.directory, track=robot.track) as link:
-        rover = Rover(link, robot, np.random.default_rng(given.seed))
+    clock = SteppedClock()
+    with PlannerLink(given.directory, track=robot.track, clock=clock) as link:
+        rover = Rover(link, robot, np.random.default_rng(given.seed), clock)
         due = time.monotonic()
         while True:
             for order, _ in orders.collect():
                 rover.wrong = order.decode()
-            rover.cycle(time.monotonic())
+            rover.cycle()
             # a cycle that was slept through is not made up for
             due = max(due + CYCLE, time.monotonic() - CYCLE)
             time.sleep(max(due - time.monotonic(), 0.0))

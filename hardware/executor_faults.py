@@ -1,0 +1,285 @@
+"""Breaks everything around a moving robot's executor, at random moments, over real processes.
+
+    python -m hardware.executor_faults --runs 100
+
+A simulated base in this process, an executor in its own, a planner of random motions in another.
+Each run breaks one thing while the robot moves, and asks: is it at rest by when it was said to be,
+does it stay so, does it drive again once the fault is over? Times are the base's and the executor's
+own. Where the machine itself stood still meanwhile, that long is allowed on top, and told. The exit
+code is 1 if anything failed.
+"""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import os
+import signal
+import sys
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from hardware.base import Odometry
+from hardware.executor import Tick
+from hardware.executor_rig import NATURE, Rig
+from hardware.executor_trials import CYCLE
+from hardware.status import State
+
+MOVING = 0.25
+"""Wheels that turn faster than this are worth stopping [m/s]."""
+AT_REST = 0.02
+"""Wheels that turn more slowly than this are at rest [m/s]."""
+STALL = 0.03
+"""A longer gap between two ticks is the machine's own [s]."""
+PATIENCE = 30.0
+"""[s] for what should take a second."""
+
+
+@dataclass(frozen=True, slots=True)
+class Kind:
+    """A fault, and by when the robot has to be at rest."""
+
+    name: str
+    begin: Callable[[Rig], object]
+    end: Callable[[Rig], object]
+    detection: float
+    """From the fault until nothing that comes is taken any more, or the robot brakes [s]."""
+    brakes: bool
+    """At once, off what it holds; else it carries on to the end of what it holds."""
+
+
+def _kill_planner(rig: Rig) -> None:
+    rig.planner.send_signal(signal.SIGKILL)
+    rig.planner.wait()
+
+
+def _start_planner(rig: Rig) -> None:
+    rig.planner = rig.start_planner()
+
+
+def _kill_executor(rig: Rig) -> None:
+    rig.executor.process.send_signal(signal.SIGKILL)
+    rig.executor.process.wait()
+
+
+def _start_executor(rig: Rig) -> None:
+    rig.executor.close()
+    rig.executor = rig.start_executor()
+
+
+def _signalled(what: str, number: int) -> Callable[[Rig], object]:
+    def send(rig: Rig) -> None:
+        process = rig.planner if what == "planner" else rig.executor.process
+        process.send_signal(number)
+
+    return send
+
+
+def kinds(rig: Rig) -> list[Kind]:
+    """All faults, with the times that the rig's settings promise."""
+    s, limits = rig.settings, NATURE.limits
+    # from the base's measurement to the executor's tick to the base's next look
+    hop = NATURE.period + 2 * s.period
+    # the planner hears that it is to go wrong in its next cycle
+    told = 2 * CYCLE
+
+    def wrong(how: str) -> Callable[[Rig], object]:
+        return lambda rig: rig.order(how)
+
+    def broken(how: str) -> Callable[[Rig], object]:
+        return lambda rig: rig.inject(how)
+
+    def cut(is_cut: bool) -> Callable[[Rig], object]:
+        return lambda rig: rig.cut(cut=is_cut)
+
+    return [
+        Kind("planner killed", _kill_planner, _start_planner, hop, False),
+        Kind(
+            "planner stopped", _signalled("planner", signal.SIGSTOP),
+            _signalled("planner", signal.SIGCONT), hop, False,
+        ),
+        Kind("link cut", cut(True), cut(False), hop, False),
+        Kind(
+            "scans frozen", wrong("frozen"), wrong(""), told + s.sensor_timeout, False
+        ),
+        Kind("numbers that are none", wrong("nan"), wrong(""), told, False),
+        Kind("planner's clock stepped", wrong("clock"), wrong(""), told, False),
+        Kind("feedback silent", broken("silent"), broken(""), s.feedback_timeout + hop, True),
+        Kind("feedback nan", broken("nan"), broken(""), hop, True),
+        Kind("feedback jumps 1 m", broken("jump"), broken(""), hop, True),
+        Kind("base deaf", broken("deaf"), broken(""), hop, True),
+        Kind("executor killed", _kill_executor, _start_executor, limits.command_timeout, True),
+        Kind(
+            "executor stopped", _signalled("executor", signal.SIGSTOP),
+            _signalled("executor", signal.SIGCONT), limits.command_timeout, True,
+        ),
+        Kind("emergency stop", Rig.press, Rig.release, hop, True),
+    ]  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class Run:
+    """What became of one."""
+
+    kind: str
+    took: float
+    """From the fault to rest [s]."""
+    allowed: float
+    """[s]."""
+    stalled: float
+    """How long the machine stood still meanwhile; it is in `allowed` [s]."""
+    error: float
+    """Greatest distance from the path in the second before the fault, by the executor [m]."""
+    back: float
+    """From the fault's end until it moved again [s]."""
+    failure: str = ""
+
+
+def try_once(rig: Rig, kind: Kind, rng: np.random.Generator) -> Run:
+    """Wait until the robot moves, break one thing, look what becomes of it, and mend it."""
+    failed = Run(kind.name, np.nan, np.nan, 0.0, np.nan, np.nan)
+    if not rig.wait(lambda: rig.fastest > MOVING, PATIENCE):
+        return _with(failed, "it did not move")
+    time.sleep(rng.uniform(0.0, 1.0))
+    if not rig.wait(lambda: rig.fastest > MOVING, PATIENCE):
+        return _with(failed, "it did not move any more")
+    seen, began = len(rig.truth), time.monotonic()
+    kind.begin(rig)
+    rested = rig.wait(lambda: _rests_since(rig, began, 0.2), PATIENCE)
+    time.sleep(rng.uniform(0.0, 0.5))
+    ticks = rig.ticks()
+    ended = time.monotonic()
+    truth = [o for o in rig.truth[max(seen - 5, 0) :] if o.stamp <= ended]
+    kind.end(rig)
+    if not rested:
+        return _with(failed, "it did not come to rest")
+    moving = [o.stamp for o in truth if o.stamp > began and _fastest(o) > AT_REST]
+    rest_at = max(moving, default=began)
+    stalled = _stalled([t.time for t in ticks], began, rest_at, kind)
+    stalled += _stalled([o.stamp for o in truth], began, rest_at, None)
+    by = _allowed(rig, kind, began, truth, ticks)
+    back = rig.wait(lambda: rig.fastest > AT_REST * 5, PATIENCE)
+    moved_again = time.monotonic() - ended
+    error = max(
+        (t.error for t in ticks if began - 1.0 < t.time < began and t.state == State.FOLLOWING),
+        default=0.0,
+    )
+    took, allowed = rest_at - began, by - began + stalled
+    failure = ""
+    if took > allowed:
+        failure = f"at rest after {took:.3f} s, and {allowed:.3f} s were allowed"
+    elif not back:
+        failure = "it did not drive again"
+    return Run(kind.name, took, allowed, stalled, error, moved_again, failure)
+
+
+def _with(run: Run, failure: str) -> Run:
+    return Run(run.kind, run.took, run.allowed, run.stalled, run.error, run.back, failure)
+
+
+def _fastest(truth: Odometry) -> float:
+    return max(abs(truth.right), abs(truth.left))
+
+
+def _rests_since(rig: Rig, began: float, long: float) -> bool:
+    """Whether it has been at rest for so long, after what is being tried began [s]."""
+    count = round(long / NATURE.period)
+    last = rig.truth[-count:]
+    return last[0].stamp > began and all(_fastest(o) <= AT_REST for o in last)
+
+
+def _stalled(times: Sequence[float], began: float, until: float, kind: Kind | None) -> float:
+    """How long the machine stood still between two times [s]."""
+    if kind is not None and kind.name.startswith("executor"):
+        return 0.0
+    gaps = np.diff([t for t in times if began - STALL <= t <= until + STALL])
+    return float(gaps[gaps > STALL].sum())
+
+
+def _allowed(
+    rig: Rig, kind: Kind, began: float, truth: Sequence[Odometry], ticks: Sequence[Tick]
+) -> float:
+    """When it has to be at rest, at the latest [s]."""
+    known = began + kind.detection
+    late = rig.settings.rest_late
+    if not kind.brakes:
+        return max((t.rests_from for t in ticks if t.time <= known), default=began) + late
+    if kind.name == "base deaf":
+        # off its path first, which takes as long as it takes
+        known = next((t.time for t in ticks if t.time > began and t.state == State.BRAKING), known)
+    # it may speed up until it is known, and orders go ahead of what the wheels do
+    speeds = [_fastest(o) for o in truth if o.stamp <= known]
+    speeds += [max(abs(t.right), abs(t.left)) for t in ticks if began - 0.1 < t.time <= known]
+    rest = max(speeds) / NATURE.limits.acceleration + late
+    # the base's own stop comes after the time in which orders would have stopped it
+    return known + (2 * rest if kind.name == "base deaf" else rest)
+
+
+def campaign(runs: int, rng: np.random.Generator, only: Sequence[str] = ()) -> list[Run]:
+    """Each kind of fault so often.
+
+    Args:
+        runs: of each kind.
+        rng: decides moments and motions; the machine's own timing does too.
+        only: names of kinds; none: all.
+    """
+    done: list[Run] = []
+    with Rig(rng) as rig:
+        chosen = [kind for kind in kinds(rig) if not only or kind.name in only]
+        for _ in range(runs):
+            for kind in chosen:
+                done.append(try_once(rig, kind, rng))
+                print(f"\r{len(done)} of {runs * len(chosen)}", end="", file=sys.stderr)
+    print(file=sys.stderr)
+    return done
+
+
+def table(done: Sequence[Run]) -> str:
+    """What became of them, a row for each kind."""
+    rows = [
+        "| fault | runs | failed | to rest: median, longest [s] | least to spare [s] |"
+        " drives again after: median, longest [s] |",
+        "|---|---|---|---|---|---|",
+    ]
+    for name in dict.fromkeys(run.kind for run in done):
+        these = [run for run in done if run.kind == name]
+        took, back = [r.took for r in these], [r.back for r in these]
+        spare = min(r.allowed - r.took for r in these)
+        rows.append(
+            f"| {name} | {len(these)} | {sum(bool(r.failure) for r in these)} |"
+            f" {np.median(took):.2f}, {max(took):.2f} | {spare:.2f} |"
+            f" {np.median(back):.2f}, {max(back):.2f} |"
+        )
+    return "\n".join(rows)
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(
+        description="Break everything around a moving robot's executor, over real processes.",
+        epilog="example: python -m hardware.executor_faults --runs 3 --seed 7",
+    )
+    parser.add_argument("--runs", type=int, default=3, help="of each kind")
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--only", nargs="*", default=(), help="names of kinds")
+    given = parser.parse_args()
+    with contextlib.suppress(OSError):
+        # the base must keep time as one of its own would
+        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(10))
+    done = campaign(given.runs, np.random.default_rng(given.seed), given.only)
+    print(table(done))
+    stalls = [run.stalled for run in done if run.stalled]
+    print(
+        f"{len(done)} runs; farthest off the path {1000 * max(r.error for r in done):.0f} mm;"
+        f" the machine stood still in {len(stalls)} runs, {max(stalls, default=0.0):.2f} s at most"
+    )
+    failures = [run for run in done if run.failure]
+    for run in failures:
+        print(f"{run.kind}: {run.failure}")
+    return 1 if failures else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
