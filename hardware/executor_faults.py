@@ -25,8 +25,10 @@ import numpy as np
 from hardware.base import Odometry
 from hardware.executor import Tick
 from hardware.executor_rig import NATURE, Rig
+from hardware.executor_settings import ExecutorSettings
 from hardware.executor_trials import CYCLE
 from hardware.status import State
+from passpmp_ti import door
 
 MOVING = 0.25
 """Wheels that turn faster than this are worth stopping [m/s]."""
@@ -34,6 +36,8 @@ AT_REST = 0.02
 """Wheels that turn more slowly than this are at rest [m/s]."""
 STALL = 0.03
 """A longer gap between two ticks is the machine's own [s]."""
+SETTLED = 0.5
+"""A fault is forgotten this long after its end [s]."""
 PATIENCE = 30.0
 """[s] for what should take a second."""
 
@@ -132,7 +136,7 @@ class Run:
     stalled: float
     """How long the machine stood still meanwhile; it is in `allowed` [s]."""
     error: float
-    """Greatest distance from the path in the second before the fault, by the executor [m]."""
+    """Greatest distance from the path just before the fault, by the executor [m]."""
     back: float
     """From the fault's end until it moved again [s]."""
     failure: str = ""
@@ -143,7 +147,7 @@ def try_once(rig: Rig, kind: Kind, rng: np.random.Generator) -> Run:
     failed = Run(kind.name, np.nan, np.nan, 0.0, np.nan, np.nan)
     if not rig.wait(lambda: rig.fastest > MOVING, PATIENCE):
         return _with(failed, "it did not move")
-    time.sleep(rng.uniform(0.0, 1.0))
+    time.sleep(SETTLED + rng.uniform(0.0, 1.0))
     if not rig.wait(lambda: rig.fastest > MOVING, PATIENCE):
         return _with(failed, "it did not move any more")
     seen, began = len(rig.truth), time.monotonic()
@@ -164,7 +168,7 @@ def try_once(rig: Rig, kind: Kind, rng: np.random.Generator) -> Run:
     back = rig.wait(lambda: rig.fastest > AT_REST * 5, PATIENCE)
     moved_again = time.monotonic() - ended
     error = max(
-        (t.error for t in ticks if began - 1.0 < t.time < began and t.state == State.FOLLOWING),
+        (t.error for t in ticks if began - SETTLED < t.time < began and t.state == State.FOLLOWING),
         default=0.0,
     )
     took, allowed = rest_at - began, by - began + stalled
@@ -218,22 +222,35 @@ def _allowed(
     return known + (2 * rest if kind.name == "base deaf" else rest)
 
 
-def campaign(runs: int, rng: np.random.Generator, only: Sequence[str] = ()) -> list[Run]:
+def campaign(
+    runs: int,
+    rng: np.random.Generator,
+    only: Sequence[str] = (),
+    settings: ExecutorSettings | None = None,
+    see: Callable[[list[Run]], None] = lambda done: None,
+) -> list[Run]:
     """Each kind of fault so often.
 
     Args:
         runs: of each kind.
         rng: decides moments and motions; the machine's own timing does too.
         only: names of kinds; none: all.
+        settings: of the executor.
+        see: shown what is done, after each run.
+
+    Raises:
+        ValueError: no fault has that name.
     """
     done: list[Run] = []
-    with Rig(rng) as rig:
-        chosen = [kind for kind in kinds(rig) if not only or kind.name in only]
+    with Rig(rng, settings=settings) as rig:
+        known = {kind.name: kind for kind in kinds(rig)}
+        for name in only:
+            door.choice("campaign", "only", name, known)
+        chosen = [known[name] for name in (only or known)]
         for _ in range(runs):
             for kind in chosen:
                 done.append(try_once(rig, kind, rng))
-                print(f"\r{len(done)} of {runs * len(chosen)}", end="", file=sys.stderr)
-    print(file=sys.stderr)
+                see(done)
     return done
 
 
@@ -256,6 +273,13 @@ def table(done: Sequence[Run]) -> str:
     return "\n".join(rows)
 
 
+def _show(done: list[Run]) -> None:
+    failed = sum(bool(run.failure) for run in done)
+    if sys.stderr.isatty() or len(done) % 100 == 0:
+        end = "\r" if sys.stderr.isatty() else "\n"
+        print(f"{len(done)} runs, {failed} failed: {done[-1].kind:30s}", end=end, file=sys.stderr)
+
+
 def main() -> int:
     parser = argparse.ArgumentParser(
         description="Break everything around a moving robot's executor, over real processes.",
@@ -268,7 +292,12 @@ def main() -> int:
     with contextlib.suppress(OSError):
         # the base must keep time as one of its own would
         os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(10))
-    done = campaign(given.runs, np.random.default_rng(given.seed), given.only)
+    try:
+        rng = np.random.default_rng(given.seed)
+        done = campaign(given.runs, rng, given.only, see=_show)
+    except ValueError as error:
+        print(error, file=sys.stderr)
+        return 2
     print(table(done))
     stalls = [run.stalled for run in done if run.stalled]
     print(

@@ -38,14 +38,21 @@ NATURE = BaseNature(slip=0.05, pose_noise=0.002, heading_noise=0.002, speed_nois
 class Rig:
     """All of it, running. The base's truth and the executor's ticks are kept."""
 
-    def __init__(self, rng: np.random.Generator, *, wheel_speed: float = 1.5) -> None:
+    def __init__(
+        self,
+        rng: np.random.Generator,
+        *,
+        settings: ExecutorSettings | None = None,
+        wheel_speed: float = 1.5,
+    ) -> None:
         """
         Args:
             rng: decides noise, slip and motions.
+            settings: of the executor.
             wheel_speed: greatest, of the motions [m/s].
         """
         self.robot = DifferentialDrive(wheel_speed=wheel_speed)
-        self.settings = ExecutorSettings()
+        self.settings = ExecutorSettings() if settings is None else settings
         self.truth: list[Odometry] = []
         self.directory = Path(tempfile.mkdtemp(prefix="executor-"))
         self._wheel_speed = wheel_speed

@@ -30,7 +30,12 @@ WRONGS = ("", "nan", "clock", "frozen")
 
 
 def motion(
-    robot: DifferentialDrive, state: np.ndarray, start: float, rng: np.random.Generator
+    robot: DifferentialDrive,
+    state: np.ndarray,
+    start: float,
+    rng: np.random.Generator,
+    *,
+    most_pieces: int = 3,
 ) -> Trajectory:
     """A random motion within the robot's limits, then braking in proportion, to rest.
 
@@ -39,36 +44,29 @@ def motion(
         state: [5] where it begins.
         start: when [s].
         rng: decides what it is.
+        most_pieces: of constant wheel acceleration, before it brakes.
     """
-    states = [np.array(state, dtype=np.float64)]
-    a, top = robot.acceleration, robot.wheel_speed
-    for _ in range(int(rng.integers(1, 4))):
-        rates = rng.choice([a, 0.0, -a], 2, p=[0.5, 0.3, 0.2])
-        for _ in range(int(rng.integers(10, 50))):
-            wheels = np.clip(states[-1][3:] + rates * TIME_STEP, -top, top)
-            states.append(_moved(robot, states[-1], wheels))
-    brakes_from = len(states) - 1
-    wheels = states[-1][3:]
-    steps = math.ceil(np.abs(wheels).max() / (a * TIME_STEP))
-    for n in range(steps - 1, -1, -1):
-        states.append(_moved(robot, states[-1], wheels * (n / steps)))
+    wheels = [np.array(state[3:], dtype=np.float64)[None]]
+    a, top = robot.acceleration * TIME_STEP, robot.wheel_speed
+    for _ in range(int(rng.integers(1, most_pieces + 1))):
+        changes = rng.choice([a, 0.0, -a], 2, p=[0.5, 0.3, 0.2])
+        count = np.arange(1, int(rng.integers(11, 51)))[:, None]
+        wheels.append(np.clip(wheels[-1][-1] + changes * count, -top, top))
+    last = wheels[-1][-1]
+    steps = math.ceil(np.abs(last).max() / a)
+    # zero times a negative number is a zero, too
+    braked = last * (np.arange(steps - 1, -1, -1) / max(steps, 1))[:, None] + 0.0
+    speeds = np.concatenate([*wheels, braked])
+    # the midpoint rule (eq. 23)
+    means = 0.5 * (speeds[1:] + speeds[:-1])
+    turns = np.concatenate([[0.0], (means[:, 0] - means[:, 1]) / robot.track * TIME_STEP])
+    headings = state[2] + np.cumsum(turns)
+    middles = headings[1:] - 0.5 * turns[1:]
+    ways = np.stack([np.cos(middles), np.sin(middles)]) * means.mean(axis=1) * TIME_STEP
+    x, y = np.concatenate([np.zeros((2, 1)), np.cumsum(ways, axis=1)], axis=1)
+    states = np.column_stack([state[0] + x, state[1] + y, headings, speeds])
     times = start + TIME_STEP * np.arange(len(states))
-    return Trajectory(times, np.array(states), brakes_from)
-
-
-def _moved(robot: DifferentialDrive, state: np.ndarray, wheels: np.ndarray) -> np.ndarray:
-    """A step of the midpoint rule, to a state with these wheel speeds (eq. 23)."""
-    right, left = 0.5 * (state[3:] + wheels)
-    turn = (right - left) / robot.track * TIME_STEP
-    way, heading = 0.5 * (right + left) * TIME_STEP, state[2] + 0.5 * turn
-    return np.array(
-        [
-            state[0] + way * math.cos(heading),
-            state[1] + way * math.sin(heading),
-            state[2] + turn,
-            *wheels,
-        ]
-    )
+    return Trajectory(times, states, len(states) - 1 - steps)
 
 
 class SteppedClock:

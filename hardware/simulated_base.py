@@ -13,7 +13,7 @@ import numpy as np
 from hardware.base import BaseLimits, Odometry, twist_of
 from passpmp_ti import door
 
-STEP = 1e-3
+STEP = 2e-3
 """[s]; it moves in steps of this."""
 LONGEST_NAP = 2.0
 """[s]; what is at rest and was told nothing for longer has not moved since."""
