@@ -34,8 +34,8 @@ MOVING = 0.25
 """Wheels that turn faster than this are worth stopping [m/s]."""
 AT_REST = 0.02
 """Wheels that turn more slowly than this are at rest [m/s]."""
-STALL = 0.03
-"""A longer gap between two ticks is the machine's own [s]."""
+STALL = 1.5 * NATURE.period
+"""Of a longer gap between two ticks, what is beyond a period is the machine's own [s]."""
 SETTLED = 0.5
 """A fault is forgotten this long after its end [s]."""
 PATIENCE = 30.0
@@ -200,7 +200,7 @@ def _stalled(times: Sequence[float], began: float, until: float, kind: Kind | No
     if kind is not None and kind.name.startswith("executor"):
         return 0.0
     gaps = np.diff([t for t in times if began - STALL <= t <= until + STALL])
-    return float(gaps[gaps > STALL].sum())
+    return float((gaps[gaps > STALL] - NATURE.period).sum())
 
 
 def _allowed(
