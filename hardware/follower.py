@@ -106,14 +106,21 @@ def wheel_speeds(
         s.along * along, stiffness * speed * straight * across + s.turning * off, limits.track
     )
     planned = (
-        ahead.right + s.wheel_lag * ahead.right_rate,
-        ahead.left + s.wheel_lag * ahead.left_rate,
+        _leading(s.wheel_lag, ahead.right, ahead.right_rate),
+        _leading(s.wheel_lag, ahead.left, ahead.left_rate),
     )
     right, left = (
         _within(limits.wheel_speed, p + _within(s.most, e))
         for p, e in zip(planned, correction, strict=True)
     )
     return right, left
+
+
+def _leading(lag: float, speed: float, rate: float) -> float:
+    """The order by which a wheel with this lag has this speed now; never one against the way it
+    turns: if the next order came late, the end of braking would become a way back."""
+    order = speed + lag * rate
+    return 0.0 if order * speed < 0.0 else order
 
 
 def _within(most: float, value: float) -> float:

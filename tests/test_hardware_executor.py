@@ -104,10 +104,14 @@ class Bench:
             if there is None or there[3:] == (0.0, 0.0, 0.0, 0.0):
                 assert order[:2] == (0.0, 0.0)
                 return
-            right = there.right + s.wheel_lag * there.right_rate
-            left = there.left + s.wheel_lag * there.left_rate
-            assert abs(order.right - right) <= s.most + 1e-9
-            assert abs(order.left - left) <= s.most + 1e-9
+            for ordered, speed, rate in (
+                (order.right, there.right, there.right_rate),
+                (order.left, there.left, there.left_rate),
+            ):
+                planned = speed + s.wheel_lag * rate
+                # braking to rest never turns into a way back
+                planned = 0.0 if planned * speed < 0.0 else planned
+                assert abs(ordered - planned) <= s.most + 1e-9
             return
         self.taken = []
         fastest = max(abs(before.right), abs(before.left))

@@ -91,24 +91,20 @@ def test_the_button_has_its_own_way_and_the_sockets_are_for_this_user_only(tmp_p
         assert list(directory.glob("executor")) == []
 
 
-def test_a_moving_robot_comes_to_rest_when_its_planner_is_killed_or_its_feedback_lost():
+def test_a_moving_robot_comes_to_rest_when_something_fails_or_it_is_asked_to_end():
     rng = np.random.default_rng(0)
     with Rig(rng, settings=PATIENT) as rig:
         by_name = {kind.name: kind for kind in kinds(rig)}
         for name in ("planner killed", "feedback nan"):
             run = try_once(rig, by_name[name], rng)
             assert run.failure == "", run
-
-
-def test_asked_to_end_it_comes_to_rest_first():
-    rng = np.random.default_rng(1)
-    with Rig(rng, settings=PATIENT) as rig:
         assert rig.wait(lambda: rig.fastest > 0.3, 30.0)
         rig.executor.process.send_signal(signal.SIGTERM)
         rig.executor.process.wait(20.0)
-        assert rig.wait(lambda: rig.fastest < 0.02, 2.0)
         last = rig.ticks()[-1]
         assert (last.right, last.left) == (0.0, 0.0)
+        assert last.time >= last.rests_from - PATIENT.period
+        assert rig.wait(lambda: rig.fastest < 0.02, 2.0)
 
 
 @pytest.mark.campaign

@@ -106,6 +106,18 @@ def test_the_robot_rests_when_the_plan_does_not_when_it_is_where_it_should_be():
     assert orders == (0.0, 0.0)
 
 
+def test_braking_to_rest_orders_no_way_back():
+    states = np.zeros((101, 5))
+    states[:, 3:] = np.linspace(1.0, 0.0, 101)[:, None]
+    times = 0.01 * np.arange(101)
+    states[:, 0] = times - 0.5 * times**2
+    path = Path(Trajectory(times, states, 0))
+    for time in np.arange(0.0, 1.1, 0.01):
+        there = Odometry(time, *path.at(time)[:5])
+        orders = wheel_speeds(there, path.at, time, BaseLimits(), FollowerSettings())
+        assert min(orders) > -1e-3
+
+
 def test_orders_stay_within_what_the_base_can_do_however_far_off_the_robot_is():
     path = Path(a_motion(1))
     limits = BaseLimits(wheel_speed=0.5)
