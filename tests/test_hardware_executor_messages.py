@@ -9,10 +9,12 @@ import pytest
 from hypothesis import given
 from hypothesis import settings as searching
 from hypothesis import strategies as st
+from oracle import exact
 
 from hardware.base import Odometry
 from hardware.executor import ADDRESS
 from hardware.executor_fuzz import ROBOT, Chain, fuzz, right_messages
+from hardware.executor_settings import ExecutorSettings
 from hardware.executor_trials import motion
 from hardware.held import OWN
 from hardware.letterbox import LONGEST_NAME, MOST_AT_ONCE, Letterbox
@@ -34,7 +36,7 @@ from hardware.messages import (
     decode,
 )
 from hardware.status import Reason, State, Status, Verdict
-from passpmp_ti.trajectory import Trajectory
+from passpmp_ti import Navigator, Settings, Trajectory
 
 NUMBERS = st.floats(allow_nan=False, width=64)
 STATUS = Status(
@@ -286,3 +288,37 @@ def test_a_base_that_slept_does_not_do_what_it_was_told_before(chain):
     chain.server.step()
     chain.now += 0.1
     assert chain.base.truth[4:] == (0.0, 0.0)
+
+
+# with the planner -----------------------------------------------------------------------------
+
+
+def test_a_planners_trajectories_are_taken_and_followed_within_its_margins(chain):
+    executor = ExecutorSettings()
+    settings = Settings.for_robot(
+        ROBOT, object_speed=0.5, cell=0.1, capacity=400, particles=20, iterations=20,
+        tracking_error=executor.bound, stamp_error=executor.rest_late,
+    )  # fmt: skip
+    executor.check_margins(settings, scan_age=0.0)
+    navigator = Navigator(ROBOT, settings, goal=(3.0, 0.5))
+    world, link, taken = exact.world_of(), chain.link, []
+    for cycle in range(15):
+        stamp = chain.now
+        pose = chain.base.truth[1:4]
+        scan = exact.sweep(world, pose, 360, 2 * np.pi, 6.0, stamp)
+        trajectory = navigator.update(scan, link.state_at(stamp), following=link.following)
+        # at first the executor's own rest is what is followed
+        assert navigator.record.not_taken == (cycle == 0)
+        assert navigator.record.deviation < executor.bound
+        link.beat(stamp)
+        if link.offer(trajectory):
+            chain.tick()
+            chain.tick()
+            taken.append(link.status.verdict)
+            assert link.following is trajectory
+        while chain.now < stamp + settings.cycle - 0.001:
+            chain.tick()
+    assert taken == [Verdict.TAKEN] * len(taken)
+    assert len(taken) > 5
+    assert chain.base.truth.x > 0.3
+    assert chain.executor.held.worst_error < 0.02
