@@ -146,8 +146,7 @@ class Held:
 
     def reset(self) -> bool:
         """Forget an emergency stop, if the robot is at rest. Whether it did."""
-        here = self._odometry
-        if self.state is not State.EMERGENCY or not self._rests(here):
+        if self.state is not State.EMERGENCY or not self._rests(self._odometry):
             return False
         self._let_go(State.STOPPED, self.reason)
         return True
@@ -163,8 +162,7 @@ class Held:
         self._odometry = odometry
         trouble = self._trouble(odometry, now)
         if self.state in TAKES and trouble is not Reason.NONE:
-            self._let_go(State.BRAKING, trouble)
-            self._rest_by = now + self._braking_time() + self._settings.rest_late
+            self._give_up(trouble, now)
         if self.state in TAKES:
             assert odometry is not None
             self.order = self._follow(odometry, now, since_last)
@@ -245,8 +243,7 @@ class Held:
         ]
         right, left = wheel_speeds(odometry, self.at, now, self._limits, self._settings.follower)
         if not (math.isfinite(right) and math.isfinite(left)):
-            self._let_go(State.BRAKING, Reason.NO_ORDER)
-            self._rest_by = now + self._braking_time() + self._settings.rest_late
+            self._give_up(Reason.NO_ORDER, now)
             return self._brake(since_last, now)
         silent = [source for source in Source if self._silent(source, now)]
         if now >= leg.path.end:
@@ -271,9 +268,6 @@ class Held:
         stop = self.state is State.EMERGENCY or now >= self._rest_by
         return Order(share * right, share * left, stop)
 
-    def _braking_time(self) -> float:
-        return max(abs(self.order.right), abs(self.order.left)) / self._limits.acceleration
-
     def _come_to_rest(self, odometry: Odometry | None, now: float) -> None:
         """After braking the robot stands; once it is known where, that is what is held."""
         if self.state is State.EMERGENCY:
@@ -291,6 +285,12 @@ class Held:
             rest = Path.resting(odometry.x, odometry.y, odometry.theta, odometry.stamp)
             self._legs = [Leg(odometry.stamp, rest, OWN)]
             self.state, self.reason = State.RESTING, Reason.NONE
+
+    def _give_up(self, reason: Reason, now: float) -> None:
+        """Brake off what is held."""
+        self._let_go(State.BRAKING, reason)
+        fastest = max(abs(self.order.right), abs(self.order.left))
+        self._rest_by = now + fastest / self._limits.acceleration + self._settings.rest_late
 
     def _let_go(self, state: State, reason: Reason) -> None:
         self.state, self.reason = state, reason
