@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import math
 import os
 import signal
 import sys
@@ -36,6 +37,8 @@ AT_REST = 0.02
 """Wheels that turn more slowly than this are at rest [m/s]."""
 STALL = 1.5 * NATURE.period
 """Of a longer gap between two ticks, what is beyond a period is the machine's own [s]."""
+RESTS = 0.15
+"""At rest for this long is at rest [s]; less than before it may drive again."""
 SETTLED = 0.5
 """A fault is forgotten this long after its end [s]."""
 PATIENCE = 30.0
@@ -53,6 +56,8 @@ class Kind:
     """From the fault until nothing that comes is taken any more, or the robot brakes [s]."""
     brakes: bool
     """At once, off what it holds; else it carries on to the end of what it holds."""
+    stays: bool = True
+    """It stays at rest while the fault lasts: after a jump it knows where it is, and drives on."""
 
 
 def _kill_planner(rig: Rig) -> None:
@@ -113,7 +118,7 @@ def kinds(rig: Rig) -> list[Kind]:
         Kind("planner's clock stepped", wrong("clock"), wrong(""), told, False),
         Kind("feedback silent", broken("silent"), broken(""), s.feedback_timeout + hop, True),
         Kind("feedback nan", broken("nan"), broken(""), hop, True),
-        Kind("feedback jumps 1 m", broken("jump"), broken(""), hop, True),
+        Kind("feedback jumps 1 m", broken("jump"), broken(""), hop, True, False),
         Kind("base deaf", broken("deaf"), broken(""), hop, True),
         Kind("executor killed", _kill_executor, _start_executor, limits.command_timeout, True),
         Kind(
@@ -144,7 +149,7 @@ class Run:
 
 def try_once(rig: Rig, kind: Kind, rng: np.random.Generator) -> Run:
     """Wait until the robot moves, break one thing, look what becomes of it, and mend it."""
-    failed = Run(kind.name, np.nan, np.nan, 0.0, np.nan, np.nan)
+    failed = Run(kind.name, math.inf, 0.0, 0.0, 0.0, math.inf)
     if not rig.wait(lambda: rig.fastest > MOVING, PATIENCE):
         return _with(failed, "it did not move")
     time.sleep(SETTLED + rng.uniform(0.0, 1.0))
@@ -152,16 +157,15 @@ def try_once(rig: Rig, kind: Kind, rng: np.random.Generator) -> Run:
         return _with(failed, "it did not move any more")
     seen, began = len(rig.truth), time.monotonic()
     kind.begin(rig)
-    rested = rig.wait(lambda: _rests_since(rig, began, 0.2), PATIENCE)
+    rested = rig.wait(lambda: _rest_at(rig.truth[seen:], began) is not None, PATIENCE)
     time.sleep(rng.uniform(0.0, 0.5))
     ticks = rig.ticks()
     ended = time.monotonic()
     truth = [o for o in rig.truth[max(seen - 5, 0) :] if o.stamp <= ended]
     kind.end(rig)
-    if not rested:
+    rest_at = _rest_at(truth, began)
+    if not rested or rest_at is None:
         return _with(failed, "it did not come to rest")
-    moving = [o.stamp for o in truth if o.stamp > began and _fastest(o) > AT_REST]
-    rest_at = max(moving, default=began)
     stalled = _stalled([t.time for t in ticks], began, rest_at, kind)
     stalled += _stalled([o.stamp for o in truth], began, rest_at, None)
     by = _allowed(rig, kind, began, truth, ticks)
@@ -175,6 +179,8 @@ def try_once(rig: Rig, kind: Kind, rng: np.random.Generator) -> Run:
     failure = ""
     if took > allowed:
         failure = f"at rest after {took:.3f} s, and {allowed:.3f} s were allowed"
+    elif kind.stays and any(_fastest(o) > AT_REST for o in truth if o.stamp > rest_at):
+        failure = "it moved while the fault lasted"
     elif not back:
         failure = "it did not drive again"
     return Run(kind.name, took, allowed, stalled, error, moved_again, failure)
@@ -188,11 +194,16 @@ def _fastest(truth: Odometry) -> float:
     return max(abs(truth.right), abs(truth.left))
 
 
-def _rests_since(rig: Rig, began: float, long: float) -> bool:
-    """Whether it has been at rest for so long, after what is being tried began [s]."""
-    count = round(long / NATURE.period)
-    last = rig.truth[-count:]
-    return last[0].stamp > began and all(_fastest(o) <= AT_REST for o in last)
+def _rest_at(truth: Sequence[Odometry], began: float) -> float | None:
+    """When it came to rest [s]; None: it has not been at rest for `RESTS` yet."""
+    rest_at = began
+    for now in truth:
+        if now.stamp > began:
+            if _fastest(now) > AT_REST:
+                rest_at = now.stamp
+            elif now.stamp > rest_at + RESTS:
+                return rest_at
+    return None
 
 
 def _stalled(times: Sequence[float], began: float, until: float, kind: Kind | None) -> float:
@@ -274,6 +285,8 @@ def table(done: Sequence[Run]) -> str:
 
 
 def _show(done: list[Run]) -> None:
+    if done[-1].failure:
+        print(f"{done[-1].kind}: {done[-1].failure}", file=sys.stderr)
     failed = sum(bool(run.failure) for run in done)
     if sys.stderr.isatty() or len(done) % 100 == 0:
         end = "\r" if sys.stderr.isatty() else "\n"
@@ -300,14 +313,13 @@ def main() -> int:
         return 2
     print(table(done))
     stalls = [run.stalled for run in done if run.stalled]
+    farthest = max(done, key=lambda run: run.error)
     print(
-        f"{len(done)} runs; farthest off the path {1000 * max(r.error for r in done):.0f} mm;"
+        f"{len(done)} runs; farthest off the path {1000 * farthest.error:.0f} mm, before:"
+        f" {farthest.kind};"
         f" the machine stood still in {len(stalls)} runs, {max(stalls, default=0.0):.2f} s at most"
     )
-    failures = [run for run in done if run.failure]
-    for run in failures:
-        print(f"{run.kind}: {run.failure}")
-    return 1 if failures else 0
+    return 1 if any(run.failure for run in done) else 0
 
 
 if __name__ == "__main__":

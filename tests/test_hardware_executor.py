@@ -459,6 +459,32 @@ def test_it_moves_nothing_before_it_knows_where_the_robot_is():
     assert order.stop
 
 
+def test_without_the_time_out_a_silent_base_would_be_driven_blindly():
+    for timeout, state in ((0.06, State.BRAKING), (10.0, State.FOLLOWING)):
+        bench = moving(settings=ExecutorSettings(feedback_timeout=timeout))
+        bench.base.inject("silent")
+        bench.planner = False
+        bench.run(0.08)
+        assert bench.held.state is state
+
+
+def test_without_the_bound_a_robot_off_its_path_would_be_steered_back_from_anywhere():
+    for bound, state in ((0.08, State.BRAKING), (5.0, State.RESTING)):
+        bench = Bench(planner=False, settings=ExecutorSettings(bound=bound))
+        bench.run(0.5)
+        bench.base.inject("jump")
+        bench.run(0.02)
+        assert bench.held.state is state
+
+
+def test_without_the_join_the_robot_would_be_told_to_jump():
+    loose = ExecutorSettings(bound=1.0, join=(0.5, 0.01, 0.02))
+    for settings, verdict in ((SETTINGS, Verdict.DOES_NOT_JOIN), (loose, Verdict.TAKEN)):
+        bench = Bench(planner=False, settings=settings)
+        bench.run(0.5)
+        assert bench.send(elsewhere(bench.plan())) is verdict
+
+
 # the emergency stop ---------------------------------------------------------------------------
 
 
