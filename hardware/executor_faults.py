@@ -15,7 +15,6 @@ import argparse
 import contextlib
 import math
 import os
-import signal
 import sys
 import time
 from collections.abc import Callable, Sequence
@@ -25,9 +24,9 @@ import numpy as np
 
 from hardware.base import Odometry
 from hardware.executor import Tick
+from hardware.executor_kinds import Kind, kinds
 from hardware.executor_rig import NATURE, Rig
 from hardware.executor_settings import ExecutorSettings
-from hardware.executor_trials import CYCLE
 from hardware.status import State
 from passpmp_ti import door
 
@@ -43,90 +42,6 @@ SETTLED = 0.5
 """A fault is forgotten this long after its end [s]."""
 PATIENCE = 30.0
 """[s] for what should take a second."""
-
-
-@dataclass(frozen=True, slots=True)
-class Kind:
-    """A fault, and by when the robot has to be at rest."""
-
-    name: str
-    begin: Callable[[Rig], object]
-    end: Callable[[Rig], object]
-    detection: float
-    """From the fault until nothing that comes is taken any more, or the robot brakes [s]."""
-    brakes: bool
-    """At once, off what it holds; else it carries on to the end of what it holds."""
-    stays: bool = True
-    """It stays at rest while the fault lasts: after a jump it knows where it is, and drives on."""
-
-
-def _kill_planner(rig: Rig) -> None:
-    rig.planner.send_signal(signal.SIGKILL)
-    rig.planner.wait()
-
-
-def _start_planner(rig: Rig) -> None:
-    rig.planner = rig.start_planner()
-
-
-def _kill_executor(rig: Rig) -> None:
-    rig.executor.process.send_signal(signal.SIGKILL)
-    rig.executor.process.wait()
-
-
-def _start_executor(rig: Rig) -> None:
-    rig.executor.close()
-    rig.executor = rig.start_executor()
-
-
-def _signalled(what: str, number: int) -> Callable[[Rig], object]:
-    def send(rig: Rig) -> None:
-        process = rig.planner if what == "planner" else rig.executor.process
-        process.send_signal(number)
-
-    return send
-
-
-def kinds(rig: Rig) -> list[Kind]:
-    """All faults, with the times that the rig's settings promise."""
-    s, limits = rig.settings, NATURE.limits
-    # from the base's measurement to the executor's tick to the base's next look
-    hop = NATURE.period + 2 * s.period
-    # the planner hears that it is to go wrong in its next cycle
-    told = 2 * CYCLE
-
-    def wrong(how: str) -> Callable[[Rig], object]:
-        return lambda rig: rig.order(how)
-
-    def broken(how: str) -> Callable[[Rig], object]:
-        return lambda rig: rig.inject(how)
-
-    def cut(is_cut: bool) -> Callable[[Rig], object]:
-        return lambda rig: rig.cut(cut=is_cut)
-
-    return [
-        Kind("planner killed", _kill_planner, _start_planner, hop, False),
-        Kind(
-            "planner stopped", _signalled("planner", signal.SIGSTOP),
-            _signalled("planner", signal.SIGCONT), hop, False,
-        ),
-        Kind("link cut", cut(True), cut(False), hop, False),
-        Kind(
-            "scans frozen", wrong("frozen"), wrong(""), told + s.sensor_timeout, False
-        ),
-        Kind("numbers that are none", wrong("nan"), wrong(""), told, False),
-        Kind("planner's clock stepped", wrong("clock"), wrong(""), told, False),
-        Kind("feedback silent", broken("silent"), broken(""), s.feedback_timeout + hop, True),
-        Kind("feedback nan", broken("nan"), broken(""), hop, True),
-        Kind("feedback jumps 1 m", broken("jump"), broken(""), hop, True, False),
-        Kind("base deaf", broken("deaf"), broken(""), hop, True),
-        Kind("executor killed", _kill_executor, _start_executor, limits.command_timeout, True),
-        Kind(
-            "executor stopped", _signalled("executor", signal.SIGSTOP),
-            _signalled("executor", signal.SIGCONT), limits.command_timeout, True,
-        ),
-        Kind("emergency stop", Rig.press, Rig.release, hop, True),
-    ]  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)
@@ -166,8 +81,9 @@ def try_once(rig: Rig, kind: Kind, rng: np.random.Generator) -> Run:
     rest_at = _rest_at(truth, began)
     if not rested or rest_at is None:
         return _with(failed, "it did not come to rest")
-    stalled = _stalled([t.time for t in ticks], began, rest_at, kind)
-    stalled += _stalled([o.stamp for o in truth], began, rest_at, None)
+    stalled = _stalled([o.stamp for o in truth], began, rest_at)
+    if kind.ticks:
+        stalled += _stalled([t.time for t in ticks], began, rest_at)
     by = _allowed(rig, kind, began, truth, ticks)
     back = rig.wait(lambda: rig.fastest > AT_REST * 5, PATIENCE)
     moved_again = time.monotonic() - ended
@@ -206,10 +122,8 @@ def _rest_at(truth: Sequence[Odometry], began: float) -> float | None:
     return None
 
 
-def _stalled(times: Sequence[float], began: float, until: float, kind: Kind | None) -> float:
+def _stalled(times: Sequence[float], began: float, until: float) -> float:
     """How long the machine stood still between two times [s]."""
-    if kind is not None and kind.name.startswith("executor"):
-        return 0.0
     gaps = np.diff([t for t in times if began - STALL <= t <= until + STALL])
     return float((gaps[gaps > STALL] - NATURE.period).sum())
 
@@ -222,15 +136,13 @@ def _allowed(
     late = rig.settings.rest_late
     if not kind.brakes:
         return max((t.rests_from for t in ticks if t.time <= known), default=began) + late
-    if kind.name == "base deaf":
-        # off its path first, which takes as long as it takes
+    if not kind.obeys:
         known = next((t.time for t in ticks if t.time > began and t.state == State.BRAKING), known)
     # it may speed up until it is known, and orders go ahead of what the wheels do
     speeds = [_fastest(o) for o in truth if o.stamp <= known]
     speeds += [max(abs(t.right), abs(t.left)) for t in ticks if began - 0.1 < t.time <= known]
     rest = max(speeds) / NATURE.limits.acceleration + late
-    # the base's own stop comes after the time in which orders would have stopped it
-    return known + (2 * rest if kind.name == "base deaf" else rest)
+    return known + (rest if kind.obeys else 2 * rest)
 
 
 def campaign(

@@ -32,6 +32,8 @@ from passpmp_ti.trajectory import Trajectory
 
 REMEMBERED = 64
 """Trajectories that were sent and may be followed still."""
+LATELY = 0.5
+"""A status is believed for this long [s]; a planner polls in every cycle."""
 LONGEST_GUESS = 0.1
 """The robot's state is told for times at most this long after the newest odometry [s]."""
 
@@ -39,13 +41,14 @@ LONGEST_GUESS = 0.1
 class PlannerLink:
     """Sends trajectories, and hears what became of them. Nothing that the executor does raises.
 
-        with PlannerLink(directory) as link:
+        with PlannerLink(directory, track=robot.track) as link:
             while driving:
                 link.poll(timeout=0.02)
-                state = link.state_at(scan.stamp)
-                trajectory = navigator.update(scan, state, following=link.following)
-                link.beat(scan.stamp)
-                link.offer(trajectory)
+                if link.ready:
+                    state = link.state_at(scan.stamp)
+                    trajectory = navigator.update(scan, state, following=link.following)
+                    link.beat(scan.stamp)
+                    link.offer(trajectory)
 
     `following` is one of the very objects that were offered, so that the planner knows it again.
     """
@@ -91,11 +94,13 @@ class PlannerLink:
     def following(self) -> Trajectory | None:
         """What the robot will have followed last of all that the executor has taken.
 
-        None: nothing is known of it, or it brakes, or moves by what another planner sent. Then
-        there is nothing to plan from; it comes to rest by itself.
+        None: nothing was heard of it lately, or it brakes, or moves by what another planner sent.
+        Then there is nothing to plan from; it comes to rest by itself.
         """
         status = self.status
         if status is None or status.state not in TAKES:
+            return None
+        if self._clock() - status.stamp > LATELY:
             return None
         session, sequence = status.newest
         if session == self._session and sequence in self._offered:

@@ -256,6 +256,15 @@ def test_without_an_executor_nothing_is_known_and_nothing_raises(tmp_path):
         assert not link.offer(Trajectory.resting(np.zeros(5), 0.0))
 
 
+def test_an_executor_that_fell_silent_is_not_believed_to_follow_still(chain):
+    assert chain.link.ready
+    chain.now += 1.0
+    assert not chain.link.ready
+    chain.tick()
+    chain.tick()
+    assert chain.link.status.stamp > chain.now - 0.1
+
+
 def test_a_flood_keeps_the_executor_from_nothing(chain):
     chain.link.offer(a_motion(chain))
     for _ in range(60):

@@ -14,7 +14,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hardware.executor_faults import campaign, kinds, table, try_once
+from hardware.executor_faults import campaign, table, try_once
+from hardware.executor_kinds import kinds
 from hardware.executor_process import ExecutorConfig, ExecutorProcess
 from hardware.executor_rig import Rig
 from hardware.executor_settings import ExecutorSettings
