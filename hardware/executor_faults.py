@@ -214,7 +214,7 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--only", nargs="*", default=(), help="names of kinds")
     given = parser.parse_args()
-    with contextlib.suppress(OSError):
+    with contextlib.suppress(OSError, AttributeError):
         # the base must keep time as one of its own would
         os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(10))
     try:

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hardware.executor_faults import campaign, table, try_once
+from hardware.executor_faults import try_once
 from hardware.executor_kinds import kinds
 from hardware.executor_process import ExecutorConfig, ExecutorProcess
 from hardware.executor_rig import Rig
@@ -109,6 +109,10 @@ def test_a_moving_robot_comes_to_rest_when_something_fails_or_it_is_asked_to_end
 
 
 @pytest.mark.campaign
-def test_every_fault_many_times():
-    done = campaign(10, np.random.default_rng(0))
-    assert [run for run in done if run.failure] == [], table(done)
+def test_every_fault_twice():
+    # a process of its own, since it takes a priority where the system grants one
+    told = subprocess.run(
+        [sys.executable, "-m", "hardware.executor_faults", "--runs", "2"],
+        capture_output=True, text=True, env={**os.environ, "PYTHONPATH": HOME},
+    )  # fmt: skip
+    assert told.returncode == 0, told.stdout + told.stderr
