@@ -1,0 +1,146 @@
+"""A base in another process: its owner serves it, the executor drives it."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+from hardware.base import Base, BaseLimits, Odometry
+from hardware.letterbox import Letterbox
+from hardware.messages import Body, Drive, Message, MessageError, Reset, Stop, decode
+
+
+class BaseServer:
+    """Lets one executor at a time drive a base. Its owner calls `step` often.
+
+    A command that lay about for as long as the base would have waited for it is no command any
+    more: a base that was asleep does not start with what it was told before.
+    """
+
+    def __init__(
+        self, base: Base, address: Path, *, clock: Callable[[], float] = time.monotonic
+    ) -> None:
+        """
+        Args:
+            base: is driven.
+            address: socket to listen at; who may enter its directory may drive.
+            clock: seconds that never go back, the same for all processes.
+        """
+        self._base = base
+        self._clock = clock
+        self._box = Letterbox(address)
+        self._session = 0
+        self._driver = ""
+        self._sent = 0
+        self._told: Odometry | None = None
+        self.garbled = 0
+        """Messages that could not be read."""
+
+    def fileno(self) -> int:
+        """For `select`."""
+        return self._box.fileno()
+
+    def step(self) -> None:
+        """Hear the driver, and tell it where the base is."""
+        for data, sender in self._box.collect():
+            try:
+                message = decode(data)
+            except MessageError:
+                self.garbled += 1
+                continue
+            self._hear(message, sender)
+        odometry = self._base.odometry()
+        if odometry is not None and odometry is not self._told and self._driver:
+            self._told = odometry
+            self._sent += 1
+            told = Message(self._session, self._sent, self._clock(), odometry)
+            self._box.post(self._driver, told.encode())
+
+    def close(self) -> None:
+        """The base stops, and nobody drives it any more."""
+        self._base.stop()
+        self._box.close()
+
+    def _hear(self, message: Message, sender: str) -> None:
+        body = message.body
+        if isinstance(body, Stop):
+            # whoever says so
+            self._base.stop()
+            return
+        if message.session < self._session:
+            return
+        self._session, self._driver = message.session, sender
+        now = self._clock()
+        if not now - self._base.limits.command_timeout <= message.sent_at:
+            return
+        if isinstance(body, Drive):
+            self._base.drive(body.right, body.left)
+        elif isinstance(body, Reset):
+            self._base.reset()
+
+
+class RemoteBase:
+    """A `Base` that another process serves."""
+
+    def __init__(
+        self,
+        address: Path,
+        limits: BaseLimits,
+        *,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        """
+        Args:
+            address: the server's socket.
+            limits: of the base.
+            clock: seconds that never go back, the same for all processes.
+        """
+        self._limits = limits
+        self._clock = clock
+        self._server = address
+        self._session = time.monotonic_ns()
+        self._sent = 0
+        self._box = Letterbox(address.with_name(f"{address.name}-{self._session:x}"))
+        self._told: Odometry | None = None
+
+    @property
+    def limits(self) -> BaseLimits:
+        return self._limits
+
+    def drive(self, right: float, left: float) -> None:
+        self._say(Drive(right, left))
+
+    def odometry(self) -> Odometry | None:
+        for data, _ in self._box.collect():
+            try:
+                message = decode(data)
+            except MessageError:
+                continue
+            if isinstance(message.body, Odometry) and message.session == self._session:
+                self._told = message.body
+        return self._told
+
+    def stop(self) -> None:
+        self._say(Stop())
+
+    def reset(self) -> None:
+        self._say(Reset())
+
+    def close(self) -> None:
+        self.stop()
+        self._box.close()
+
+    def _say(self, body: Body) -> None:
+        self._sent += 1
+        message = Message(self._session, self._sent, self._clock(), body)
+        self._box.post(self._server, message.encode())
+
+
+def build(*, address: str, **limits: float) -> RemoteBase:
+    """A remote base from plain values, as a configuration has them.
+
+    Raises:
+        ValueError: a number out of its range.
+    """
+    return RemoteBase(Path(address), BaseLimits(**limits))

@@ -1,0 +1,83 @@
+"""The emergency stop's own way to the executor.
+
+python -m hardware.stop_button DIRECTORY            # stop
+python -m hardware.stop_button DIRECTORY --reset    # let it drive again, once it stands
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import select
+import sys
+import time
+from pathlib import Path
+
+from hardware.executor import BUTTON
+from hardware.letterbox import Letterbox
+from hardware.messages import Message, MessageError, Reset, Stop, decode
+from hardware.status import State, Status
+
+PATIENCE = 1.0
+"""[s] to wait for the executor to say that it heard."""
+
+
+class StopButton:
+    """Presses and lets go; hears whether that was understood."""
+
+    def __init__(self, directory: Path) -> None:
+        self._to = directory / BUTTON
+        self._session = time.monotonic_ns()
+        self._box = Letterbox(directory / f"button-{os.getpid()}-{self._session:x}")
+        self._sent = 0
+
+    def __enter__(self) -> StopButton:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._box.close()
+
+    def press(self) -> bool:
+        """Stop for good. Whether the executor says that it does."""
+        state = self._say(Stop())
+        return state is State.EMERGENCY
+
+    def release(self) -> bool:
+        """Let it drive again. Whether the executor says that it may; not while it moves."""
+        state = self._say(Reset())
+        return state is not None and state is not State.EMERGENCY
+
+    def _say(self, body: Stop | Reset) -> State | None:
+        self._sent += 1
+        until = time.monotonic() + PATIENCE
+        message = Message(self._session, self._sent, time.monotonic(), body)
+        self._box.post(self._to, message.encode())
+        state = None
+        while state is None and (left := until - time.monotonic()) > 0.0:
+            select.select([self._box], [], [], left)
+            for data, _ in self._box.collect():
+                try:
+                    heard = decode(data)
+                except MessageError:
+                    continue
+                if isinstance(heard.body, Status) and heard.session == self._session:
+                    state = heard.body.state
+        return state
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(
+        description="Stop a robot for good, or let it drive again.",
+        epilog="example: python -m hardware.stop_button /run/passpmp",
+    )
+    parser.add_argument("directory", type=Path, help="of the executor's sockets")
+    parser.add_argument("--reset", action="store_true", help="let it drive again")
+    given = parser.parse_args()
+    with StopButton(given.directory) as button:
+        done = button.release() if given.reset else button.press()
+    print(("drives again" if given.reset else "stops") if done else "the executor did not obey")
+    return 0 if done else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())
