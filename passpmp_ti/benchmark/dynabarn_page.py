@@ -144,8 +144,8 @@ def page(told_: Mapping[str, Any]) -> str:
         "# DynaBARN\n",
         f"{told_['trials_done']} of {told_['trials_wanted']} trials, {told_['date']}. Trials in"
         " which it happened, with exact 95 % intervals (Clopper-Pearson). Arrived: within 1 m of"
-        f" the goal in {LONGEST:g} s. Untouched: and nothing touched the robot, moving or not. Time:"
-        " mean of those that arrived. Nearest: the rectangle to anything, while it moved.\n",
+        f" the goal in {LONGEST:g} s. Untouched: and nothing touched the robot, moving or not."
+        " Time: mean of those that arrived. Nearest: the rectangle to anything, while it moved.\n",
         markdown(head, rows),
         _conditions(told_),
     ]

@@ -29,10 +29,12 @@ BOUNDS = {"easy": 0.95, "medium": 1.45, "hard": 1.95}
 """By class: no cylinder is ever faster [m/s]."""
 PER_CLASS = 20
 """Worlds of a class, by their numbers."""
-APPROACH = 12.0
-"""From so far outside a cylinder comes in [m]: farther than the planner looks."""
-KEEP_OUT = 1.0
-"""No cylinder is nearer to the robot's start when an episode begins [m]."""
+OUTSIDE = 12.0
+"""From so far outside a cylinder comes in, and so far it goes out [m]: farther than the planner
+looks."""
+KEEP_OUT, QUIET = 1.0, 5.0
+"""No cylinder comes nearer to the robot's start [m] in the first seconds of an episode [s]: as
+published, none ever does, since the start lies outside the border."""
 GOLDEN = 0.6180339887498949
 
 
@@ -85,30 +87,36 @@ def outwards(place: np.ndarray) -> np.ndarray:
     return normal / np.hypot(*normal)
 
 
-def movers_of(crossings: Sequence[Crossing], begin: float, end: float) -> PathMovers:
-    """Every pass of every cylinder that is there at any time from `begin` to `end` [s].
+def passed(crossing: Crossing) -> np.ndarray:
+    """[n + 2, 3] rows t, x, y of one pass [s, m, m], from outside the arena to outside.
 
     In the recordings a cylinder that has reached its exit stands at its entry the next moment, half
-    of it inside the arena. Here it has come in from outside, straight through the border, at the
-    speed at which it then goes on: nobody is born in sight. At its exit it is gone, as recorded.
+    of it inside the arena. Here it comes in, straight through the border, at the speed at which it
+    then goes on, and goes out like that: nobody is born, or is gone, in sight.
     """
-    paths, born, gone, radius = [], [], [], []
+    way = crossing.way
+    ends = []
+    for end, beside, sign in ((way[0], way[1], -1.0), (way[-1], way[-2], 1.0)):
+        speed = math.dist(end[1:], beside[1:]) / abs(end[0] - beside[0])
+        place = end[1:] + OUTSIDE * outwards(end[1:])
+        ends.append([end[0] + sign * OUTSIDE / speed, *place])
+    return np.concatenate([ends[:1], way, ends[1:]])
+
+
+def movers_of(crossings: Sequence[Crossing], begin: float, end: float) -> PathMovers:
+    """Every pass of every cylinder that is there at any time from `begin` to `end` [s]."""
+    paths, radius = [], []
     for crossing in crossings:
-        way = crossing.way
-        step = way[1] - way[0]
-        lead = APPROACH * step[0] / float(np.hypot(step[1], step[2]))
-        first = way[0] + np.array([-lead, *(APPROACH * outwards(way[0, 1:]))])
-        rows = np.concatenate([first[None], way])
-        for lap in range(
-            math.floor(begin / crossing.period) - 1, math.ceil((end + lead) / crossing.period) + 1
-        ):
-            moved = rows + np.array([lap * crossing.period, 0.0, 0.0])
+        rows, period = passed(crossing), crossing.period
+        first = math.floor((begin - rows[-1, 0]) / period)
+        last = math.ceil((end - rows[0, 0]) / period)
+        for lap in range(first, last + 1):
+            moved = rows + np.array([lap * period, 0.0, 0.0])
             if moved[-1, 0] >= begin and moved[0, 0] <= end:
                 paths.append(moved)
-                born.append(moved[0, 0])
-                gone.append(moved[-1, 0])
                 radius.append(crossing.radius)
-    return PathMovers(paths, np.array(radius), born=np.array(born), gone=np.array(gone))
+    born, gone = (np.array([path[row, 0] for path in paths]) for row in (0, -1))
+    return PathMovers(paths, np.array(radius), born=born, gone=gone)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -130,15 +138,21 @@ class CrossingSource:
         longest = max(crossing.period for crossing in self.crossings)
         # seed 0 begins as the recordings do, the others are spread over the longest period
         time = math.floor(1000 * longest * (seed * GOLDEN % 1.0)) / 1000
-        movers = movers_of(self.crossings, time, time + longest + duration)
-        for _ in range(math.ceil(10 * longest)):
-            apart = np.hypot(*(movers.at(time) - np.array(start[:2])).T) - movers.radius
-            if not (movers.present(time) & (apart < KEEP_OUT)).any():
+        movers = movers_of(self.crossings, time, time + 10 * longest + duration)
+        for _ in range(math.ceil(100 * longest)):
+            if self._quiet(movers, np.array(start[:2]), time):
                 return movers, time
             time = round(time + 0.1, 3)
         raise ValueError(
-            f"DynaBARN: somebody is always within {KEEP_OUT:g} m of the robot's start {start[:2]}"
+            f"DynaBARN: somebody always comes within {KEEP_OUT:g} m of the robot's start"
         )
+
+    def _quiet(self, movers: Movers, start: np.ndarray, time: float) -> bool:
+        """Whether nobody comes near the start [2] for a while after `time` [s]."""
+        times = time + np.arange(0.0, QUIET, 0.1)
+        apart = np.hypot(*np.moveaxis(movers.positions(times) - start, -1, 0)) - movers.radius
+        here = np.array([movers.present(float(t)) for t in times])
+        return not bool((here & (apart < KEEP_OUT)).any())
 
     def paced(self, top_speed: float) -> CrossingSource:
         raise ValueError("DynaBARN's cylinders move as they were recorded; no other speed is known")

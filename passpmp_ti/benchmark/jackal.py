@@ -64,7 +64,8 @@ class Jackal(DifferentialDrive):
             raise ValueError(
                 f"{owner}.states[{bad[0]}]: |v_r - v_l| / track = {turn[bad[0]]:.6g} rad/s is"
                 f" beyond the robot's limit {self.top_turn_rate:g} rad/s ({len(bad)} of"
-                f" {len(given)} bad); nothing is proven for a robot that can do what it does not declare"
+                f" {len(given)} bad); nothing is proven for a robot that can do what it does not"
+                " declare"
             )
         return given
 
