@@ -90,7 +90,7 @@ def carry_out(job: Job) -> Result:
         return told
 
 
-def _rehearse(robot: Robot, settings: Settings) -> None:
+def rehearse_once(robot: Robot, settings: Settings) -> None:
     """Compile what cycles need, once a process: else the first episodes would seem slow."""
     kernels = (type(robot), settings.mode)  # all else are numbers, which kernels are told
     if kernels not in REHEARSED:
@@ -100,7 +100,7 @@ def _rehearse(robot: Robot, settings: Settings) -> None:
 
 def _drive(job: Job) -> Result:
     scenario = job.loaded()
-    _rehearse(scenario.robot, scenario.settings)
+    rehearse_once(scenario.robot, scenario.settings)
     promises = Promises(job.judge_every)
     observer = Observer() if job.observe else None
     watchers: list[Callable[[CycleInfo], None]] = [promises.see]
