@@ -71,7 +71,7 @@ class CrowdMovers:
 
 
 def timed(way: np.ndarray, speed: float, start: float) -> np.ndarray:
-    """[n, 3] rows t, x, y of places [n, 2] [m] gone along at one speed [m/s] from `start` [s] on."""
+    """[n, 3] rows t, x, y of places [n, 2] [m], gone along at `speed` [m/s] from `start` [s] on."""
     lengths = np.hypot(*np.diff(way, axis=0).T)
     times = start + np.concatenate([[0.0], np.cumsum(lengths)]) / speed
     return np.concatenate([times[:, None], way], axis=1)

@@ -9,6 +9,8 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import Any
 
 import numpy as np
 
@@ -28,6 +30,10 @@ ROUTE = np.array([(2.0, 2.0), (2.0, 28.0), (28.0, 2.0), (28.0, 28.0)])
 DURATION = 300.0
 """An episode's longest [s]."""
 RANGE, BEAMS = 10.0, 720
+
+ROBOT = DifferentialDrive(discs=((0.0, 0.25),), wheel_speed=1.0, acceleration=1.35, track=0.4)
+"""The published robot's body and speed, on wheels that speed up and slow down as the paper's
+wheelchair's do (Sec. 5.2.1) and lie within that body."""
 
 WALKING = (0.3, 1.0)
 """Least and greatest speed of the crowd [m/s]."""
@@ -103,25 +109,27 @@ class CrowdSource:
         seed: int,
         generator: np.random.Generator,
     ) -> tuple[Movers, float]:
-        radius = generator.uniform(*RADIUS, self.count)
-        speed = generator.uniform(*WALKING, self.count) * UNDER
-        paths = []
-        for size, pace in zip(radius, speed, strict=True):
-            way = _place(size, self.corners, generator)
-            while np.hypot(*(way - start[:2])) < START_CLEAR:
-                way = _place(size, self.corners, generator)
-            way = stroll(way[None], size, pace * duration, self.corners, generator)
-            paths.append(timed(way, pace, 0.0))
+        # everybody has a generator of his own: who walks longer changes nobody else's way
+        own = generator.spawn(len(self.corners) + self.count)
         ambushes = [
-            replace(a, way=stroll(a.way, a.radius, a.speed * duration, self.corners, generator))
-            for a in (corner.ambush for corner in self.corners)
+            replace(a, way=stroll(a.way, a.radius, a.speed * duration, self.corners, his))
+            for a, his in zip((c.ambush for c in self.corners), own, strict=False)
         ]
-        return CrowdMovers(PathMovers(paths, radius), ambushes), 0.0
+        radius, paths = [], []
+        for his in own[len(self.corners) :]:
+            radius.append(his.uniform(*RADIUS))
+            speed = his.uniform(*WALKING) * UNDER
+            first = _place(radius[-1], self.corners, his)
+            while np.hypot(*(first - start[:2])) < START_CLEAR:
+                first = _place(radius[-1], self.corners, his)
+            way = stroll(first[None], radius[-1], speed * duration, self.corners, his)
+            paths.append(timed(way, speed, 0.0))
+        return CrowdMovers(PathMovers(paths, np.array(radius)), ambushes), 0.0
 
     def paced(self, top_speed: float) -> CrowdSource:
         raise ValueError(
-            f"the crowd's speeds belong to the benchmark and reach {self.top_speed:g} m/s; to plan"
-            " with another bound change object_speed by --set"
+            f"CrowdSource: the crowd's speeds belong to the benchmark and reach {self.top_speed:g}"
+            " m/s; to plan with another bound change Settings.object_speed alone"
         )
 
 
@@ -228,7 +236,7 @@ def hidden_all_along(corner: Corner, leg: int) -> bool:
 def way_along(leg: int) -> np.ndarray:
     """[n, 2] places along the route up to the end of a leg [m]."""
     pieces = []
-    for begin, end in zip(ROUTE[: leg + 1], ROUTE[1 : leg + 2], strict=True):
+    for begin, end in pairwise(ROUTE[: leg + 2]):
         count = math.ceil(float(np.hypot(*(end - begin))) / LOOKS)
         pieces.append(begin + (end - begin) * (np.arange(count) / count)[:, None])
     return np.concatenate([*pieces, ROUTE[leg + 1][None]])
@@ -247,44 +255,49 @@ def hidden(places: np.ndarray, corner: Corner) -> np.ndarray:
     return (behind & (far > near)) | (far > RANGE + corner.ambush.radius)
 
 
-def robot() -> DifferentialDrive:
-    """The paper's wheelchair's wheels (1.35 m/s^2, Sec. 5.2.1), under a body and at a speed as the
-    published robot has; their distance is such that they lie within the body."""
-    return DifferentialDrive(
-        discs=((0.0, 0.25),), wheel_speed=1.0, acceleration=1.35, track=0.4
-    )  # fmt: skip
-
-
-def crowd(count: int, seed: int, **changes: object) -> Scenario:
+def crowd(count: int, seed: int, *, labels: str = "sensor", **changes: Any) -> Scenario:
     """The scenario of one seed.
 
     Args:
         count: people in the crowd, without the six who wait.
         seed: places the occluders and those who wait; `simulate` is to be given the same.
+        labels: "sensor": the range finder tells that occluders stay; "none": nothing does.
         changes: fields of `Settings` to replace.
 
     Raises:
-        ValueError: a bad count or setting.
+        ValueError: a bad count, seed or setting.
     """
     door.whole("crowd", "count", count, least=0)
+    door.whole("crowd", "seed", seed, least=0)
     corners = draw_corners(np.random.default_rng([seed, 2]))
-    begins, way = ROUTE[0], ROUTE[1] - ROUTE[0]
-    drives = robot()
+    begin, way = ROUTE[0], ROUTE[1] - ROUTE[0]
     return Scenario(
         name=f"crowd-{count}",
         description=f"a route among {count} walkers, and six people behind occluders",
-        robot=drives,
-        settings=Settings.for_robot(drives).changed(**SETTINGS).changed(**changes),
-        lidars=(Lidar(range_max=RANGE, beams=BEAMS, labels="sensor"),),
+        robot=ROBOT,
+        settings=settings().changed(**changes),
+        lidars=(Lidar(range_max=RANGE, beams=BEAMS, labels=labels),),
         bounds=BOUNDS,
         polygons=tuple(corner.polygon for corner in corners),
         movers=CrowdSource(count=count, corners=tuple(corners)),
-        start=(float(begins[0]), float(begins[1]), math.atan2(way[1], way[0])),
+        start=(float(begin[0]), float(begin[1]), math.atan2(way[1], way[0])),
         goals=tuple((float(x), float(y)) for x, y in ROUTE[1:]),
         duration=DURATION,
     )
 
 
-SETTINGS: dict[str, object] = dict(
-    object_speed=1.0, object_width=0.5, cell=0.06, time_step=0.02, cruise_speed=1.0
-)
+def settings() -> Settings:
+    """How the robot is driven here."""
+    return Settings.for_robot(
+        ROBOT,
+        object_speed=max(WALKING[1], STEPPING),
+        object_width=0.5,  # the narrowest disc is 0.56 m wide
+        cell=0.06,
+        time_step=0.02,
+        # at the wheels' limit four of nine controls are one: with less room the tree does not
+        # turn, and the robot drives on straight past where it should
+        capacity=8000,
+        optimizer="exhaustive",
+        cruise_speed=ROBOT.top_speed,
+        guide_movers=False,
+    )
