@@ -294,7 +294,7 @@ def settings() -> Settings:
         object_width=0.5,  # the narrowest disc is 0.56 m wide
         cell=0.06,
         time_step=0.02,
-        # at the wheels' limit four of nine controls are one: with less room the tree does not
+        # at the wheels' limit four of ten controls are one: with less room the tree does not
         # turn, and the robot drives on straight past where it should
         capacity=8000,
         optimizer="exhaustive",
