@@ -198,13 +198,10 @@ def test_a_variant_is_a_mode_or_a_planner():
 
 
 def test_the_command_goes_on_where_it_stopped(brief, tmp_path, capsys):
+    given = ["benchmark", "crowd", "--counts", "2", "--workers", "1", "--no-picture"]
+
     def run(trials):
-        return main(
-            [
-                *f"benchmark crowd --counts 2 --trials {trials} --workers 1 --no-picture --out".split(),
-                str(tmp_path),
-            ]
-        )
+        return main([*given, "--out", str(tmp_path), "--trials", str(trials)])
 
     assert run(1) == 0
     first = (tmp_path / "episodes.jsonl").read_text()
@@ -215,6 +212,8 @@ def test_the_command_goes_on_where_it_stopped(brief, tmp_path, capsys):
     told = json.loads((tmp_path / "crowd.json").read_text())
     assert told["groups"]["conservative"]["2"]["trials"] == 2
     assert "2 of 2 trials" in capsys.readouterr().out
+    assert main([*given, "--out", str(tmp_path), "--labels", "none"]) == BAD_INPUT
+    assert "labels" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
