@@ -294,8 +294,8 @@ def settings() -> Settings:
         object_width=0.5,  # the narrowest disc is 0.56 m wide
         cell=0.06,
         time_step=0.02,
-        # at the wheels' limit four of ten controls are one: with less room the tree does not
-        # turn, and the robot drives on straight past where it should
+        # room for the whole last level: plans cut short by a second gain so little by a turn that
+        # it is put off from cycle to cycle
         capacity=8000,
         optimizer="exhaustive",
         cruise_speed=ROBOT.top_speed,
