@@ -99,6 +99,13 @@ def test_more_walkers_change_nothing_for_those_who_wait():
     )
 
 
+def test_walls_about_the_square_leave_room_for_everybody():
+    world = crowd(20, 0, walled=True).build(0)[0]
+    assert len(world.outline) == len(world_of(20, 0).outline) + 4
+    places = world.movers.at(7.0)
+    assert (world.clearance(places) >= world.movers.radius - 1e-9).all()
+
+
 # those who wait -------------------------------------------------------------------------------
 
 
@@ -258,7 +265,8 @@ def result(count, seed, reached, **others):
 
 def told_of(results):
     return document(
-        results, (10, 50), ("conservative",), wanted=4, labels="sensor", date="2026-01-01",
+        results, (10, 50), ("conservative",), wanted=4,
+        world={"labels": "sensor", "walled": False}, date="2026-01-01",
         command="passpmp benchmark crowd",
     )  # fmt: skip
 

@@ -61,6 +61,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         metavar="L",
         help="`sensor`: the range finder tells that occluders stay (default); `none`: all may move",
     )
+    add("--walled", action="store_true", help="walls about the square (default: open ground)")
     add("--workers", type=int, metavar="K", help="processes at once (default: one a CPU)")
     add(
         "--out",
@@ -101,8 +102,8 @@ def campaign_of(given: argparse.Namespace) -> Campaign:
         benchmark=NAME, worlds=list(dict.fromkeys(given.counts)), trials=given.trials,
         names=list(dict.fromkeys(variants)),
         conditions={
-            "benchmark": NAME, "labels": given.labels, "settings": plain(settings()),
-            "robot": plain(ROBOT),
+            "benchmark": NAME, "labels": given.labels, "walled": given.walled,
+            "settings": plain(settings()), "robot": plain(ROBOT),
         },
     )  # fmt: skip
 
@@ -121,10 +122,11 @@ def run(given: argparse.Namespace) -> int:
     from passpmp_ti.benchmark.options import drive_all, good
 
     campaign = campaign_of(given)
-    results, code = drive_all(campaign, partial(drive, labels=given.labels), given)
+    world = {"labels": given.labels, "walled": given.walled}
+    results, code = drive_all(campaign, partial(drive, **world), given)
     told = document(
         good(results), campaign.worlds, campaign.names, wanted=len(campaign.jobs()),
-        labels=given.labels, date=datetime.date.today().isoformat(), command=given.command,
+        world=world, date=datetime.date.today().isoformat(), command=given.command,
     )  # fmt: skip
     folder = Path(given.out)
     if results and not given.no_picture:
@@ -132,7 +134,7 @@ def run(given: argparse.Namespace) -> int:
             benchmark=NAME, world=campaign.worlds[0], variant=campaign.names[0],
             trial=given.picture,
         )  # fmt: skip
-        told["picture"] = draw(trial, given.labels, folder, video=given.video)
+        told["picture"] = draw(trial, folder, video=given.video, **world)
     text = page(told)
     (folder / f"{NAME}.json").write_text(json.dumps(told, indent=2) + "\n", encoding="utf-8")
     (folder / f"{NAME}.md").write_text(text, encoding="utf-8")
@@ -141,7 +143,7 @@ def run(given: argparse.Namespace) -> int:
     return code
 
 
-def draw(trial: Trial, labels: str, folder: Path, *, video: bool) -> str:
+def draw(trial: Trial, folder: Path, *, video: bool, labels: str, walled: bool) -> str:
     """Drive a trial once more and draw it; the picture of its middle, by its path in `folder`."""
     from passpmp_ti import backend
     from passpmp_ti.benchmark.crowd_trial import noticed, planner_of, scenario_of
@@ -149,7 +151,7 @@ def draw(trial: Trial, labels: str, folder: Path, *, video: bool) -> str:
     from passpmp_ti.viz.outcome import Outcome
 
     backend.init("cpu", threads=1)
-    scenario, name = scenario_of(trial, labels), "-".join(map(str, trial.key))
+    scenario, name = scenario_of(trial, labels, walled), "-".join(map(str, trial.key))
     with Outcome(folder / name, scenario.name, f"seed {trial.trial}", video=video) as outcome:
 
         def see(info: CycleInfo) -> None:

@@ -37,7 +37,7 @@ def document(
     variants: Sequence[str],
     *,
     wanted: int,
-    labels: str,
+    world: Mapping[str, Any],
     date: str,
     command: str,
 ) -> dict[str, Any]:
@@ -48,7 +48,7 @@ def document(
         counts: of walkers, in the order in which they are told.
         variants: modes and planners, likewise.
         wanted: trials in all.
-        labels: what the range finder tells of surfaces.
+        world: what `crowd` was told of all of them.
         date: of the run.
         command: that ran it.
     """
@@ -56,7 +56,7 @@ def document(
         "benchmark": "crowd",
         "date": date,
         "command": command,
-        "labels": labels,
+        "world": dict(world),
         "machine": machine(),
         "commits": sorted({r["timings"]["commit"] for r in results}),
         "trials_done": len(results),
@@ -192,11 +192,13 @@ def _conditions(told_: Mapping[str, Any]) -> str:
     tells = {
         "sensor": "tells that occluders stay",
         "none": "tells nothing: occluders too may move",
-    }[told_["labels"]]
+    }[told_["world"]["labels"]]
+    ground = "walled" if told_["world"]["walled"] else "open ground, which the robot may leave"
     return (
         f"The robot: a disc of {ROBOT.radius:g} m, two wheels {ROBOT.track:g} m apart,"
-        f" {ROBOT.top_speed:g} m/s, {ROBOT.acceleration:g} m/s^2. Its range finder {tells}. Nobody"
-        " reacts to it, and who walks into it while it stands walks on through it.\n\n"
+        f" {ROBOT.top_speed:g} m/s, {ROBOT.acceleration:g} m/s^2. Its range finder {tells}. The"
+        f" square is {ground}. Nobody reacts to the robot, and who walks into it while it stands"
+        " walks on through it.\n\n"
         f"Cycles in which a scan broke a premise: {sum(g['broken_premises'] for g in groups)};"
         f" scans that were not believed: {sum(g['lost_scans'] for g in groups)}.\n"
         + told_cost(told_)

@@ -15,10 +15,10 @@ from passpmp_ti.sim.episode import CycleInfo, Episode, simulate
 from passpmp_ti.sim.scenario import Scenario
 
 
-def scenario_of(trial: Trial, labels: str) -> Scenario:
+def scenario_of(trial: Trial, labels: str, walled: bool) -> Scenario:
     """The world of a trial: `world` counts walkers, `variant` names a mode or a planner."""
     mode = trial.variant if trial.variant in MODES else "conservative"
-    return crowd(trial.world, trial.trial, labels=labels, mode=mode)
+    return crowd(trial.world, trial.trial, labels=labels, walled=walled, mode=mode)
 
 
 def planner_of(trial: Trial) -> Callable[..., Any] | None:
@@ -26,9 +26,9 @@ def planner_of(trial: Trial) -> Callable[..., Any] | None:
     return None if trial.variant in MODES else baseline(trial.variant)
 
 
-def drive(trial: Trial, labels: str = "sensor") -> Result:
-    """Drive one trial, in a worker."""
-    return told_of(trial.key, lambda: _drive(trial, labels))
+def drive(trial: Trial, labels: str = "sensor", walled: bool = False) -> Result:
+    """Drive one trial, in a worker; the world as `crowd` makes it."""
+    return told_of(trial.key, lambda: _drive(trial, scenario_of(trial, labels, walled)))
 
 
 def noticed(info: CycleInfo) -> None:
@@ -42,8 +42,7 @@ def noticed(info: CycleInfo) -> None:
     movers.notice(info.time, info.state[:2])
 
 
-def _drive(trial: Trial, labels: str) -> dict[str, Any]:
-    scenario = scenario_of(trial, labels)
+def _drive(trial: Trial, scenario: Scenario) -> dict[str, Any]:
     planner = planner_of(trial)
     if planner is None:
         rehearse_once(scenario.robot, scenario.settings)

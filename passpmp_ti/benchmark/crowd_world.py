@@ -25,6 +25,9 @@ from passpmp_ti.sim.scenario import Scenario
 from passpmp_ti.sim.world import Bounds, World
 
 BOUNDS: Bounds = (0.0, 0.0, 30.0, 30.0)
+"""Where the crowd walks [m]."""
+VIEW: Bounds = (-2.0, -2.0, 32.0, 32.0)
+"""What pictures show: on open ground the robot may leave the square [m]."""
 ROUTE = np.array([(2.0, 2.0), (2.0, 28.0), (28.0, 2.0), (28.0, 28.0)])
 """Start and goals [m]."""
 DURATION = 300.0
@@ -255,13 +258,16 @@ def hidden(places: np.ndarray, corner: Corner) -> np.ndarray:
     return (behind & (far > near)) | (far > RANGE + corner.ambush.radius)
 
 
-def crowd(count: int, seed: int, *, labels: str = "sensor", **changes: Any) -> Scenario:
+def crowd(
+    count: int, seed: int, *, labels: str = "sensor", walled: bool = False, **changes: Any
+) -> Scenario:
     """The scenario of one seed.
 
     Args:
         count: people in the crowd, without the six who wait.
         seed: places the occluders and those who wait; `simulate` is to be given the same.
         labels: "sensor": the range finder tells that occluders stay; "none": nothing does.
+        walled: walls stand about the square; else it is open ground.
         changes: fields of `Settings` to replace.
 
     Raises:
@@ -277,12 +283,21 @@ def crowd(count: int, seed: int, *, labels: str = "sensor", **changes: Any) -> S
         robot=ROBOT,
         settings=settings().changed(**changes),
         lidars=(Lidar(range_max=RANGE, beams=BEAMS, labels=labels),),
-        bounds=BOUNDS,
+        bounds=VIEW,
         polygons=tuple(corner.polygon for corner in corners),
+        walls=_border() if walled else np.zeros((0, 4)),
         movers=CrowdSource(count=count, corners=tuple(corners)),
         start=(float(begin[0]), float(begin[1]), math.atan2(way[1], way[0])),
         goals=tuple((float(x), float(y)) for x, y in ROUTE[1:]),
         duration=DURATION,
+    )
+
+
+def _border() -> np.ndarray:
+    """[4, 4] walls about the square [m]."""
+    low_x, low_y, high_x, high_y = BOUNDS
+    return geometry.edges(
+        np.array([(low_x, low_y), (high_x, low_y), (high_x, high_y), (low_x, high_y)])
     )
 
 
