@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 from passpmp_ti import door
 from passpmp_ti.bench import command
+from passpmp_ti.benchmark import command as benchmarking
 from passpmp_ti.compare import command as comparing
 
 if TYPE_CHECKING:
@@ -404,6 +405,16 @@ def _parser() -> argparse.ArgumentParser:
     )
     comparing.add_options(compare)
     _scenario_changes(compare)
+
+    benchmarking.add_options(
+        _command(
+            commands,
+            "benchmark",
+            "drive worlds for which others have published results",
+            benchmarking.run,
+            benchmarking.EXAMPLE,
+        )
+    )
 
     _attack_options(
         _command(

@@ -75,13 +75,23 @@ def key_of(found: Result) -> Key:
 def carry_out(job: Job) -> Result:
     """Drive one episode in this process; what comes of it depends on the job alone, but for
     `timings`. An error is a result too."""
+    return told_of(job.key, lambda: _drive(job))
+
+
+def told_of(key: Key, drive: Callable[[], Mapping[str, Any]]) -> Result:
+    """A ledger's line of one episode, an error among them.
+
+    Args:
+        key: tells it from the others.
+        drive: drives it, and tells the rest; `timings` is what a clock decides.
+    """
     with ONE_AT_A_TIME:
         backend.init("cpu", threads=1)
         began = clock.perf_counter()
-        scenario, variant, seed = job.key
+        scenario, variant, seed = key
         told: Result = {"scenario": scenario, "variant": variant, "seed": seed, "error": None}
         try:
-            told |= _drive(job)
+            told |= drive()
         except Exception:
             told |= {"error": traceback.format_exc(), "timings": {}}
         told["timings"] |= {
@@ -90,7 +100,7 @@ def carry_out(job: Job) -> Result:
         return told
 
 
-def _rehearse(robot: Robot, settings: Settings) -> None:
+def rehearse_once(robot: Robot, settings: Settings) -> None:
     """Compile what cycles need, once a process: else the first episodes would seem slow."""
     kernels = (type(robot), settings.mode)  # all else are numbers, which kernels are told
     if kernels not in REHEARSED:
@@ -100,7 +110,7 @@ def _rehearse(robot: Robot, settings: Settings) -> None:
 
 def _drive(job: Job) -> Result:
     scenario = job.loaded()
-    _rehearse(scenario.robot, scenario.settings)
+    rehearse_once(scenario.robot, scenario.settings)
     promises = Promises(job.judge_every)
     observer = Observer() if job.observe else None
     watchers: list[Callable[[CycleInfo], None]] = [promises.see]

@@ -86,7 +86,7 @@ ADDED_TO = ("scenarios", "variants")
 def _same(name: str, known: Any, wanted: Any, folder: Path) -> Any:
     if known != wanted:
         raise ValueError(
-            f"compare.out: {folder} holds episodes with {name} = {_short(known)}; asked for is"
+            f"--out {folder} holds episodes with {name} = {_short(known)}; asked for is"
             f" {_short(wanted)}. Choose another --out, or ask for what the folder holds"
         )
     return wanted

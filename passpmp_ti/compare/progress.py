@@ -4,20 +4,30 @@ from __future__ import annotations
 
 import sys
 import time as clock
-from collections.abc import Mapping
-from typing import IO
+from collections.abc import Mapping, Sequence
+from typing import IO, Any, Protocol
 
-from passpmp_ti.compare.comparison import Comparison
 from passpmp_ti.compare.job import Key, Result
 
 SPARSE = 30.0
 """Seconds between lines where the output is not a terminal."""
 
 
+class Planned(Protocol):
+    """Episodes that are to be driven: a comparison, or a benchmark."""
+
+    @property
+    def variants(self) -> Sequence[Any]:
+        """What is told apart; each has a `name`."""
+
+    def jobs(self) -> Sequence[Any]:
+        """Every episode; each has a `key`."""
+
+
 class ComparisonProgress:
     """Tells what is done, what is left, and the counts of each variant."""
 
-    def __init__(self, comparison: Comparison, stream: IO[str] | None = None) -> None:
+    def __init__(self, comparison: Planned, stream: IO[str] | None = None) -> None:
         self._wanted = [job.key for job in comparison.jobs()]
         self._variants = [v.name for v in comparison.variants]
         self._stream = sys.stderr if stream is None else stream

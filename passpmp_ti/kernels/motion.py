@@ -8,8 +8,9 @@ Primitives are integrated as seen from where they begin, and then put there: sma
 rounded less, and the same whatever the place and the heading.
 
 Robot parameters, as `Robot.parameters` gives them:
-    0 top speed, 1 lowest speed, 2 top steering angle, 3 half the inverse of wheelbase or track,
-    4 top acceleration, 5 unused.
+    0 top speed, 1 lowest speed, 2 top steering angle of a car; of a differential drive the greatest
+    difference of its wheels' speeds (0: whatever the wheels can do), 3 half the inverse of the
+    wheelbase or track, 4 top acceleration, 5 unused.
 """
 
 import taichi as ti
@@ -179,6 +180,11 @@ def driven(kind: ti.template(), robot: robot6, q: pose7, control: control3, dire
             a = ti.min(a, 0.0)
     else:
         b = clamp(b + control[2] * dt, robot[1], robot[0])
+        if robot[2] > 0.0:
+            # both wheels give up as much: neither changes faster than it was told to
+            over = 0.5 * (a - b - clamp(a - b, -robot[2], robot[2]))
+            a -= over
+            b += over
     return a, b
 
 
