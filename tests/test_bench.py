@@ -247,6 +247,24 @@ def test_a_map_and_a_tree_stand_beside_others(name, beside, tmp_path, capsys):
     assert not (tmp_path / f"{name}-cpu.json").exists()
 
 
+def test_modes_are_shown_the_same_drive_again(monkeypatch):
+    from passpmp_ti.bench import modes
+    from passpmp_ti.sim.scenario import load_scenario
+
+    monkeypatch.setattr(modes, "WARM_UP", 1)
+    small = load_scenario("simple").changed({"capacity": 60})
+    told = modes.measure(Options(scenario=small, cycles=3))
+    assert told.rows[0]["cycles"] == 3
+    assert set(told.ratios) == {
+        "simple: conservative / hybrid", "simple: conservative / probabilistic"
+    }  # fmt: skip
+    assert all(ratio > 0 for ratio in told.ratios.values())
+    # what is shown again leads to the same decisions
+    shown = modes.drive(small, "hybrid", 4, seed=0)
+    again = modes.drive(small, "hybrid", 4, seed=0)
+    assert all(np.array_equal(a.state, b.state) for a, b in zip(shown, again, strict=True))
+
+
 def test_the_swarm_s_figures_become_a_table_and_ratios(monkeypatch):
     def measure_swarm(seed, progress, nodes=(10,)):
         progress("swarm")

@@ -17,8 +17,8 @@ EXAMPLE = """passpmp bench check tree --quick
   passpmp bench --limit path/to/cpp --json all.json
   passpmp bench cycle --cycles 200 --json cycle.json
   passpmp bench anytime --cycles 10000 --deadline 0.05"""
-NAMES = ("raster", "check", "tree", "swarm", "cycle", "anytime", "startup", "memory")
-DRIVING = ("cycle", "anytime")
+NAMES = ("raster", "check", "tree", "swarm", "cycle", "modes", "anytime", "startup", "memory")
+DRIVING = ("cycle", "modes", "anytime")
 """Those that can drive a scenario that is named after them."""
 STRICT = 1
 """Exit code where a ratio fell and --strict was given."""
@@ -31,8 +31,8 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         "names",
         nargs="*",
         metavar="name",
-        help=f"{', '.join(NAMES)}; all if none is named. After `cycle` also a scenario that it"
-        " or `anytime` drives instead of its own",
+        help=f"{', '.join(NAMES)}; all if none is named. After `cycle` also a scenario that it,"
+        " `modes` or `anytime` drives instead of its own",
     )
     add("--backend", default="auto", metavar="B", help="auto, cpu, cuda, vulkan or metal")
     add("--threads", type=int, metavar="N", help="of the kernels and their rivals (default: all)")
@@ -40,7 +40,12 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     add("--limit", metavar="DIR", help="a folder with the tuned C++ (perf.cpp) to compare with")
     add("--quick", action="store_true", help="smaller sizes, fewer rounds")
     add("--sizes", metavar="A,B", help="states, nodes or capacities instead of the usual ones")
-    add("--cycles", type=int, metavar="N", help="of `cycle` (1000) and `anytime` (10000)")
+    add(
+        "--cycles",
+        type=int,
+        metavar="N",
+        help="of `cycle` (1000), `modes` (150) and `anytime` (10000)",
+    )
     add("--deadline", type=float, metavar="S", help="of a cycle of `anytime` [s] (default: 0.05)")
     add("--results", metavar="DIR", help="committed results (default: benchmarks/results)")
     add(

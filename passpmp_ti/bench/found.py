@@ -28,12 +28,12 @@ class Options:
     sizes: tuple[int, ...] | None = None
     """States, nodes or capacities; None: the benchmark's own."""
     cycles: int | None = None
-    """Of `cycle` and `anytime`; None: the benchmark's own number."""
+    """Of `cycle`, `modes` and `anytime`; None: the benchmark's own number."""
     deadline: float | None = None
     """Of a cycle of `anytime` [s]; None: its own."""
     seed: int = 0
     scenario: Scenario | None = None
-    """Driven by `cycle` or `anytime` in place of its own scenes."""
+    """Driven by `cycle`, `modes` or `anytime` in place of its own scenes."""
     see: Callable[[str], None] = lambda _: None
     """Told what is being measured."""
 

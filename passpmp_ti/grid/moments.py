@@ -19,7 +19,7 @@ SHARPEST = 16.0
 BLUR = 2.0
 """Sharper ones are blurred by noise; what is farther out in it than this [its standard deviations]
 is made up for by a factor."""
-LEFT_OUT = 1e-6
+LEFT_OUT = 2e-5
 """What an object that is not looked up may add to the risk [1/s]."""
 SMALLEST = 1e-6
 """Components of less weight than this are not looked up: their weight is risk."""

@@ -30,6 +30,8 @@ from passpmp_ti.kernels.spread import spread, spread_over
 KINDS = 8
 LOST = 1e3
 """Stands for what is beyond a layer or a forecast: a risk of 1."""
+LONGEST = 0.7
+"""What lies about the middle of a piece is made up for by tan(x) / x of this: 1.2 at most."""
 MOST_PIECES = 8
 """To either side of a moment."""
 
@@ -200,10 +202,10 @@ def crossings(
         before: time that the moment speaks for before it, and after it [s].
     """
     j, _ = moment_of(starts, odds, tick)
-    # a piece of the way is at most a standard deviation long, as seen from what is near
+    # half of a piece of the way is at most LONGEST standard deviations long, seen from what is near
     speed = ti.sqrt(u.dot(u)) + grids[j, 5]
     turn = speed * ti.max(before, after) * 2.0 * ti.max(grids[j, 4], grids[j + 1, 4])
-    reach = ti.min(ti.cast(ti.ceil(turn - 0.5), ti.i32), MOST_PIECES)
+    reach = ti.min(ti.cast(ti.ceil(turn - LONGEST), ti.i32), MOST_PIECES)
     pieces = 2 * reach + 1
     turn /= pieces
     total = 0.0
