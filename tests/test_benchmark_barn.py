@@ -208,11 +208,11 @@ def alley():
 
 
 def test_the_jackal_goes_into_a_narrow_alley():
-    scenario = shortened(barn.scenario_of(alley()), 2.4)
+    scenario = shortened(barn.scenario_of(alley()), 1.6)
     course = Course(scenario.start[:2], GOAL)
     episode = simulate(scenario, on_cycle=course.see)
     told = outcome_of(episode, course)
-    assert told["distance"] > 3.0  # 1.25 m/s on average from rest: it is between the rows
+    assert told["distance"] > 1.8  # from rest: its nose is between the rows
     assert 0 < told["nearest"] < 0.5 - 0.075 - WIDTH / 2 + 0.05
     assert not told["touched_moving"]
     assert not told["collisions_moving"]
