@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -79,8 +79,7 @@ def document(
             "ours": _group(worlds, [r for n in common for r in by_world[n]]),
             "published": {
                 planner: {
-                    key: float(np.nanmean([of[n][key] for n in common])) if common else None
-                    for key in ("success", "time", "score")
+                    key: _mean(of[n][key] for n in common) for key in ("success", "time", "score")
                 }
                 for planner, of in published.items()
             },
@@ -90,6 +89,12 @@ def document(
         "worlds": lines,
         "picture": None,
     }
+
+
+def _mean(values: Iterable[float]) -> float | None:
+    """Of those that are numbers: a world in which nobody succeeded has no time."""
+    there = [value for value in values if np.isfinite(value)]
+    return float(np.mean(there)) if there else None
 
 
 def _group(worlds: Mapping[int, BarnWorld], results: Sequence[dict[str, Any]]) -> dict[str, Any]:

@@ -138,10 +138,10 @@ class CrossingSource:
         longest = max(crossing.period for crossing in self.crossings)
         # seed 0 begins as the recordings do, the others are spread over the longest period
         time = math.floor(1000 * longest * (seed * GOLDEN % 1.0)) / 1000
-        movers = movers_of(self.crossings, time, time + 10 * longest + duration)
+        movers = movers_of(self.crossings, time, time + 10 * longest + QUIET)
         for _ in range(math.ceil(100 * longest)):
             if self._quiet(movers, np.array(start[:2]), time):
-                return movers, time
+                return movers_of(self.crossings, time, time + duration), time
             time = round(time + 0.1, 3)
         raise ValueError(
             f"DynaBARN: somebody always comes within {KEEP_OUT:g} m of the robot's start"
