@@ -351,8 +351,8 @@ def risk_along(
                 )
         sample = q
         sample_tick = tick
-        if risk[TOUCH] > most:
-            going = False
+        if risk_of(odds, tally, risk) > most:
+            going = False  # it only grows
     return risk, q, tick
 
 
