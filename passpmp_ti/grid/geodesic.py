@@ -11,7 +11,7 @@ from passpmp_ti.grid.view import Views
 from passpmp_ti.grid.window import Window
 from passpmp_ti.kernels.arrival import LANES, SAMPLING
 from passpmp_ti.kernels.beams import SLACK
-from passpmp_ti.kernels.geodesic import COLUMNS, ROWS, open_cells, walk, walk_apart
+from passpmp_ti.kernels.geodesic import COLUMNS, FAR, ROWS, open_cells, walk, walk_apart
 from passpmp_ti.settings import Settings
 
 MOST_SWEEPS = 200
@@ -22,7 +22,9 @@ class _Scratch(threading.local):
     """What each thread's kernels work in from cycle to cycle."""
 
     def __init__(self) -> None:
-        self._arrays: dict[tuple[int, bool], tuple[device.Array, ...]] = {}
+        self._arrays: dict[
+            tuple[int, bool], tuple[device.Array, device.Array, device.Array]
+        ] = {}
 
     def __call__(self, size: int) -> tuple[device.Array, device.Array, device.Array]:
         """What cells cost, lengths to corners, and what was stirred (elsewhere: other lengths)."""
@@ -30,9 +32,11 @@ class _Scratch(threading.local):
         if key not in self._arrays:
             shape = (size + 2 * ROWS + 1, size + 3 * COLUMNS)
             last = shape if device.resident() else (shape[0], shape[1] // LANES)
-            self._arrays = {key: tuple(device.empty(s, np.int32) for s in (shape, shape, last))}
-        toll, way, last = self._arrays[key]
-        return toll, way, last
+            toll = device.full(shape, FAR, np.int32)
+            self._arrays = {
+                key: (toll, device.empty(shape, np.int32), device.empty(last, np.int32))
+            }
+        return self._arrays[key]
 
 
 _scratch = _Scratch()

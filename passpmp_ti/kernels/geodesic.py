@@ -40,15 +40,14 @@ LEVEL, DIAGONAL, KNIGHT = 996, 1442, 2228
 norm. It is at most 2.8 % less."""
 FAR = 1 << 28
 """Length of what is not reached, and of a move that is barred."""
-ENDS = 2.0
-"""[cells] by which a chain from corner to corner may be longer than a way that begins and ends
-anywhere in the cells: less than one at either end."""
+ENDS = 4 * (LEVEL + DIAGONAL - KNIGHT)
+"""[1 / UNIT cells] by which a chain between corners of two cells may be longer than a way between
+any points of them: at either end two moves may find no partner to make a knight's move with."""
 BLOCK, SMALLEST_BLOCK = 8, 4
-TURNS = 16
-"""Jacobi rounds in one launch; an even number."""
+TURNS = 4
+"""Rounds of moves in one launch; an even number."""
 
 Lengths = ti.types.ndarray(dtype=ti.i32, ndim=2)
-vec = ti.types.vector(LANES, ti.i32)
 
 
 @ti.func
@@ -150,8 +149,9 @@ def open_cells(
     apart: ti.f32,  # by how much views may disagree [m]
     # scratch
     far: Views,  # [V, n_max] where each wedge ends for what may walk in it [m]
+    # in / out
+    toll: Lengths,  # [J + 2 ROWS + 1, I + 3 COLUMNS] of cells: 0 open, else FAR, as the padding is
     # out
-    toll: Lengths,  # [J + 2 ROWS + 1, I + 3 COLUMNS] of cells: 0 open, else FAR
     way: Lengths,  # the same of corners: 0 about sources, else FAR
 ):
     """Which cells a way may lead through, and where it may begin."""
@@ -168,8 +168,7 @@ def open_cells(
                 end = ti.max(ti.max(ranges[v, a], ranges[v, b]) + behind, end)
             far[v, w] = end + SLACK
 
-    for j, i in toll:
-        toll[j, i] = FAR
+    for j, i in way:
         way[j, i] = FAR
 
     columns = seen.shape[1] // BLOCK
@@ -194,61 +193,64 @@ def open_cells(
 
 
 @ti.func
-def taken_from(array: ti.template(), j, i):
-    """[LANES] of a row from column i on."""
-    found = vec(0)
-    for lane in ti.static(range(LANES)):
+def taken_from(array: ti.template(), j, i, lanes: ti.template()):
+    """[lanes] of a row from column i on."""
+    found = ti.Vector.zero(ti.i32, lanes)
+    for lane in ti.static(range(lanes)):
         found[lane] = array[j, i + lane]
     return found
 
 
 @ti.func
-def from_side(toll: ti.template(), way: ti.template(), j, i, side):
-    """[LANES] lengths to a row's corners by a move from the rows on one side; side: -1 or 1."""
+def from_side(toll: ti.template(), way: ti.template(), j, i, side, lanes: ti.template()):
+    """[lanes] lengths to a row's corners by a move from the rows on one side; side: -1 or 1."""
     near = j + side
     # cells between the two rows of corners, and beyond the nearer one
     here = j + (side - 1) // 2
     beyond = here + side
-    left = taken_from(toll, here, i - 1)
-    right = taken_from(toll, here, i)
-    least = taken_from(way, near, i) + (left & right) + LEVEL
-    least = ti.min(least, taken_from(way, near, i - 1) + left + DIAGONAL)
-    least = ti.min(least, taken_from(way, near, i + 1) + right + DIAGONAL)
-    wide = left | taken_from(toll, here, i - 2)
-    least = ti.min(least, taken_from(way, near, i - 2) + wide + KNIGHT)
-    wide = right | taken_from(toll, here, i + 1)
-    least = ti.min(least, taken_from(way, near, i + 2) + wide + KNIGHT)
-    tall = left | taken_from(toll, beyond, i - 1)
-    least = ti.min(least, taken_from(way, near + side, i - 1) + tall + KNIGHT)
-    tall = right | taken_from(toll, beyond, i)
-    return ti.min(least, taken_from(way, near + side, i + 1) + tall + KNIGHT)
+    left = taken_from(toll, here, i - 1, lanes)
+    right = taken_from(toll, here, i, lanes)
+    least = taken_from(way, near, i, lanes) + (left & right) + LEVEL
+    least = ti.min(least, taken_from(way, near, i - 1, lanes) + left + DIAGONAL)
+    least = ti.min(least, taken_from(way, near, i + 1, lanes) + right + DIAGONAL)
+    wide = left | taken_from(toll, here, i - 2, lanes)
+    least = ti.min(least, taken_from(way, near, i - 2, lanes) + wide + KNIGHT)
+    wide = right | taken_from(toll, here, i + 1, lanes)
+    least = ti.min(least, taken_from(way, near, i + 2, lanes) + wide + KNIGHT)
+    tall = left | taken_from(toll, beyond, i - 1, lanes)
+    least = ti.min(least, taken_from(way, near + side, i - 1, lanes) + tall + KNIGHT)
+    tall = right | taken_from(toll, beyond, i, lanes)
+    return ti.min(least, taken_from(way, near + side, i + 1, lanes) + tall + KNIGHT)
 
 
 @ti.func
-def spread_along(toll: ti.template(), way: ti.template(), stirred: ti.template(), j, b, step, turn):
-    """Hand lengths on along a row of corners, from block b to the right or to the left, for as long
-    as they fall."""
-    going = True
-    at = b
-    while going and at >= 1 and at < way.shape[1] // LANES - 1:
-        i = at * LANES
+def spread_along(toll: ti.template(), way: ti.template(), stirred: ti.template(), j, step, turn):
+    """Hand the lengths that fell in a turn on along their row of corners, to the right for step 1
+    or to the left for -1, for as long as they fall."""
+    blocks = way.shape[1] // LANES
+    handed = False
+    for k in range(1, blocks - 1):
+        b = k
         if step < 0:
-            i += LANES - 1
-        carried = way[j, i - step]
-        fell = False
-        for _ in range(LANES):
-            between = ti.min(i, i - step)
-            carried += LEVEL + (toll[j, between] & toll[j - 1, between])
-            old = way[j, i]
-            fell = fell or carried < old
-            carried = ti.min(carried, old)
-            way[j, i] = carried
-            i += step
-        if fell:
-            stirred[j, at] = turn
-        # what fell in the first block before is handed on by its end
-        going = fell or at == b
-        at += step
+            b = blocks - 1 - k
+        if handed or stirred[j, b] == turn:
+            i = b * LANES
+            if step < 0:
+                i += LANES - 1
+            carried = way[j, i - step]
+            fell = False
+            for _ in range(LANES):
+                between = ti.min(i, i - step)
+                carried += LEVEL + (toll[j, between] & toll[j - 1, between])
+                old = way[j, i]
+                fell = fell or carried < old
+                carried = ti.min(carried, old)
+                way[j, i] = carried
+                i += step
+            # the next block hears of it through this one's end
+            handed = fell or stirred[j, b] == turn
+            if fell:
+                stirred[j, b] = turn
 
 
 @kernel
@@ -273,14 +275,10 @@ def walk(
         for j in range(rows):
             for b in range(blocks):
                 # what is given counts as fallen in the first sweep: both directions hear of it
-                stirred[j, b] = ti.select(taken_from(way, j, b * LANES).min() < FAR, 2, 0)
+                stirred[j, b] = ti.select(taken_from(way, j, b * LANES, LANES).min() < FAR, 2, 0)
         for j in range(ROWS, rows - ROWS):
-            for b in range(1, blocks - 1):
-                if stirred[j, b] > 0:
-                    spread_along(toll, way, stirred, j, b, 1, 2)
-            for b in range(1, blocks - 1):
-                if stirred[j, blocks - 1 - b] > 0:
-                    spread_along(toll, way, stirred, j, blocks - 1 - b, -1, 2)
+            spread_along(toll, way, stirred, j, 1, 2)
+            spread_along(toll, way, stirred, j, -1, 2)
         busy = True
         while busy and sweeps <= most_sweeps:
             sweeps += 1
@@ -291,37 +289,38 @@ def walk(
                 if sweeps % 2 == 1:
                     j = rows - 1 - jj
                     side = 1
+                fell = False
                 for b in range(1, blocks - 1):
                     heard = 0
                     for near in ti.static(range(1, 3)):
                         for beside in ti.static(range(-1, 2)):
                             heard = ti.max(heard, stirred[j + side * near, b + beside])
                     if heard >= sweeps - 1:
-                        old = taken_from(way, j, b * LANES)
-                        new = ti.min(old, from_side(toll, way, j, b * LANES, side))
+                        old = taken_from(way, j, b * LANES, LANES)
+                        new = ti.min(old, from_side(toll, way, j, b * LANES, side, LANES))
                         if (old - new).max() > 0:
-                            busy = True
+                            fell = True
                             stirred[j, b] = sweeps
                             for lane in ti.static(range(LANES)):
                                 way[j, b * LANES + lane] = new[lane]
-                            spread_along(toll, way, stirred, j, b, 1, sweeps)
-                            spread_along(toll, way, stirred, j, b, -1, sweeps)
+                if fell:
+                    busy = True
+                    spread_along(toll, way, stirred, j, 1, sweeps)
+                    spread_along(toll, way, stirred, j, -1, sweeps)
     return sweeps
 
 
 @ti.func
 def step_apart(toll: ti.template(), before: ti.template(), after: ti.template(), j, i):
-    """Least lengths of a block by one move from what they were; how many of them fell."""
-    old = taken_from(before, j, i)
-    left = taken_from(toll, j, i - 1) & taken_from(toll, j - 1, i - 1)
-    right = taken_from(toll, j, i) & taken_from(toll, j - 1, i)
-    new = ti.min(old, from_side(toll, before, j, i, -1))
-    new = ti.min(new, from_side(toll, before, j, i, 1))
-    new = ti.min(new, taken_from(before, j, i - 1) + left + LEVEL)
-    new = ti.min(new, taken_from(before, j, i + 1) + right + LEVEL)
-    for lane in ti.static(range(LANES)):
-        after[j, i + lane] = new[lane]
-    return ti.cast(new != old, ti.i32).sum()
+    """The least length to a corner by one move from what lengths were; whether it fell."""
+    left = taken_from(toll, j, i - 1, 1) & taken_from(toll, j - 1, i - 1, 1)
+    right = taken_from(toll, j, i, 1) & taken_from(toll, j - 1, i, 1)
+    new = ti.min(from_side(toll, before, j, i, -1, 1), from_side(toll, before, j, i, 1, 1))
+    new = ti.min(new, taken_from(before, j, i - 1, 1) + left + LEVEL)
+    new = ti.min(new, taken_from(before, j, i + 1, 1) + right + LEVEL)
+    old = before[j, i]
+    after[j, i] = ti.min(old, new[0])
+    return new[0] < old
 
 
 @kernel
@@ -332,21 +331,18 @@ def walk_apart(
     way: Lengths,  # as for `walk`
     other: Lengths,  # scratch, as `way` as it begins
 ) -> ti.i32:
-    """The same by a thread for every block, all blocks at once, for `TURNS` rounds; returns how
-    many lengths fell in the last of them. They end where those of `walk` do."""
+    """The same by a thread for every corner, for `TURNS` rounds of one move each; returns how many
+    lengths fell in the last of them. They end where those of `walk` do."""
     fell = 0
     for t in ti.static(range(TURNS)):
-        for row, block in ti.ndrange(way.shape[0] - 2 * ROWS, way.shape[1] // LANES - 2):
+        for row, column in ti.ndrange(way.shape[0] - 2 * ROWS, way.shape[1] - 2 * COLUMNS):
             j = row + ROWS
-            i = (block + 1) * LANES
+            i = column + COLUMNS
             if ti.static(t % 2 == 0):
-                fell_here = step_apart(toll, way, other, j, i)
+                step_apart(toll, way, other, j, i)
+            elif step_apart(toll, other, way, j, i):
                 if ti.static(t == TURNS - 1):
-                    fell += fell_here
-            else:
-                fell_here = step_apart(toll, other, way, j, i)
-                if ti.static(t == TURNS - 1):
-                    fell += fell_here
+                    fell += 1
     return fell
 
 
@@ -373,18 +369,20 @@ def arrival_round_walls(
     taken = 1e-3 * cell + SLACK + SAMPLING * cell + clearance
     for j, b in ti.ndrange(arrival.shape[0], arrival.shape[1] // LANES):
         i = b * LANES
-        # to any point of a cell no less than to the nearest of its corners
-        least = ti.min(
-            taken_from(way, j + ROWS, i + COLUMNS), taken_from(way, j + ROWS, i + COLUMNS + 1)
-        )
-        least = ti.min(least, taken_from(way, j + ROWS + 1, i + COLUMNS))
-        least = ti.min(least, taken_from(way, j + ROWS + 1, i + COLUMNS + 1))
-        cells = ti.cast(least, ti.f32) / UNIT - ENDS
-        length = ti.select(least < FAR, cells, NO_SEED) * cell - taken
         ticks = row_of(arrival, j, i)
         # 0: not free, or reached at once: neither is asked about again
-        later = ti.max(ticks, arrival_ticks(length, speed, stamp_error))
-        ticks = ti.select(ticks > 0, later, 0)
+        if ticks.max() > 0:
+            # to any point of a cell no less than to the nearest of its corners
+            least = ti.min(
+                taken_from(way, j + ROWS, i + COLUMNS, LANES),
+                taken_from(way, j + ROWS, i + COLUMNS + 1, LANES),
+            )
+            least = ti.min(least, taken_from(way, j + ROWS + 1, i + COLUMNS, LANES))
+            least = ti.min(least, taken_from(way, j + ROWS + 1, i + COLUMNS + 1, LANES))
+            cells = ti.select(least < FAR, ti.cast(least - ENDS, ti.f32) / UNIT, NO_SEED)
+            length = cells * cell - taken
+            later = ti.max(ticks, arrival_ticks(length, speed, stamp_error))
+            ticks = ti.select(ticks > 0, later, 0)
         pj = j + shift_j
         if age >= 0 and pj >= 0 and pj < previous.shape[0]:
             ticks = ti.max(ticks, aged(row_of(previous, pj, i + shift_i), age))
