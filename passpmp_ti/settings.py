@@ -38,8 +38,8 @@ class Settings:
     """Greatest speed, from then on, of what was within range in a bearing that no sensor covers
     [m/s]; None: as `object_speed`; 0: what is there stands still for good, like a wall."""
     cones: str = "straight"
-    """How what may come out of hiding is taken to come: "straight", as the crow flies; "geodesic":
-    not through surfaces that stay, but round them. In conservative mode, with one bound of speed."""
+    """How what comes out of hiding is taken to come: "straight", as the crow flies; "geodesic":
+    round surfaces that stay, not through them. In conservative mode, with one bound of speed."""
     clear_radius: float = 0.0
     """Disc about the robot's start that is declared empty [m]; for robots with blind sectors."""
 

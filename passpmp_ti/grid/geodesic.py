@@ -22,9 +22,7 @@ class _Scratch(threading.local):
     """What each thread's kernels work in from cycle to cycle."""
 
     def __init__(self) -> None:
-        self._arrays: dict[
-            tuple[int, bool], tuple[device.Array, device.Array, device.Array]
-        ] = {}
+        self._arrays: dict[tuple[int, bool], tuple[device.Array, device.Array, device.Array]] = {}
 
     def __call__(self, size: int) -> tuple[device.Array, device.Array, device.Array]:
         """What cells cost, lengths to corners, and what was stirred (elsewhere: other lengths)."""

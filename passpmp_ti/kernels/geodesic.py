@@ -35,9 +35,9 @@ ROWS, COLUMNS = 2, LANES
 UNIT = 1024
 """Of lengths, in a cell."""
 LEVEL, DIAGONAL, KNIGHT = 996, 1442, 2228
-"""Lengths of the moves (1, 0), (1, 1), (2, 1) [1 / UNIT cells]. They span a norm whose gradients are
-(996, 236) and (786, 656) and their mirror images: no longer than UNIT, so no way is shorter than its
-norm. It is at most 2.8 % less."""
+"""Lengths of the moves (1, 0), (1, 1), (2, 1) [1 / UNIT cells]. They span a norm whose gradients
+are (996, 236), (786, 656) and their mirror images, none longer than UNIT: no way is shorter than by
+its norm, which is at most 2.8 % less."""
 FAR = 1 << 28
 """Length of what is not reached, and of a move that is barred."""
 ENDS = 4 * (LEVEL + DIAGONAL - KNIGHT)
