@@ -39,7 +39,7 @@ class Settings:
     [m/s]; None: as `object_speed`; 0: what is there stands still for good, like a wall."""
     cones: str = "straight"
     """How what comes out of hiding is taken to come: "straight", as the crow flies; "geodesic":
-    round surfaces that stay, not through them. In conservative mode, with one bound of speed."""
+    round surfaces that stay, not through them. Conservative mode; `blind_speed` 0 or v_b."""
     clear_radius: float = 0.0
     """Disc about the robot's start that is declared empty [m]; for robots with blind sectors."""
 
@@ -259,12 +259,11 @@ class Settings:
                 " what is behind it only until it moves on, so its surface must not bar a way; take"
                 ' cones="straight", or mode="conservative"'
             )
-        if self.unseen_speed < self.object_speed:
+        if 0.0 < self.unseen_speed < self.object_speed:
             raise ValueError(
-                f'Settings.cones = "{self.cones}" with blind_speed = {self.blind_speed:g} m/s below'
-                f" object_speed = {self.object_speed:g} m/s: who is faster may come by way of"
-                " bearings that no sensor covers, where no way is followed; leave blind_speed out,"
-                ' or take cones="straight"'
+                f'Settings.cones = "{self.cones}" with blind_speed = {self.blind_speed:g} m/s and'
+                f" object_speed = {self.object_speed:g} m/s: ways are followed at one speed; leave"
+                ' blind_speed out, set it to 0, or take cones="straight"'
             )
 
     @classmethod

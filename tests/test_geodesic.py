@@ -247,9 +247,10 @@ def test_nobody_walks_round_a_corner_before_the_model_says_so_in_a_long_campaign
 
 def test_no_proof_of_passive_safety_is_broken_where_walls_stop_cones():
     asked = proven = 0
-    for seed in range(8):
+    for seed in range(10):
         case = cases.random_case(np.random.default_rng(seed))
-        settings = case.settings.changed(cones="geodesic", blind_speed=None, clear_radius=0.0)
+        slow = case.settings.unseen_speed < case.settings.object_speed
+        settings = case.settings.changed(cones="geodesic", blind_speed=0.0 if slow else None)
         a, p, found = broken_proofs_of(
             replace(case, settings=settings), np.random.default_rng(seed), 60, 100
         )

@@ -7,11 +7,13 @@ import threading
 import numpy as np
 
 from passpmp_ti import device
+from passpmp_ti.grid.distance import distance_between_cells
 from passpmp_ti.grid.view import Views
 from passpmp_ti.grid.window import Window
 from passpmp_ti.kernels.arrival import LANES, SAMPLING
 from passpmp_ti.kernels.beams import SLACK
-from passpmp_ti.kernels.geodesic import COLUMNS, FAR, ROWS, open_cells, walk, walk_apart
+from passpmp_ti.kernels.geodesic import COLUMNS, FAR, ROWS, begin_at, open_cells, walk, walk_apart
+from passpmp_ti.kernels.visibility import BLIND_SOURCES, SOURCES
 from passpmp_ti.settings import Settings
 
 MOST_SWEEPS = 200
@@ -70,6 +72,11 @@ def ways_from_sources(
         seen, marks, *window.corner, window.cell, behind, 2 * settings.localisation_error,
         device.empty(views.reach.shape, np.float32), toll, way,
     )  # fmt: skip
+    if settings.unseen_speed < settings.object_speed:
+        # Who is fast may come by way of bearings that no sensor covers, but gets there no sooner
+        # than straight; what was there before stands still, see `Settings.cones`.
+        straight = distance_between_cells(device.host(marks)[SOURCES])
+        begin_at(marks, BLIND_SOURCES, device.put(straight), toll, way)
     if not device.resident():
         return way if walk(toll, MOST_SWEEPS, way, last) <= MOST_SWEEPS else None
     last.copy_from(way)

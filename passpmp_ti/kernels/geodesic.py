@@ -192,6 +192,30 @@ def open_cells(
                     toll[j + ROWS, i + COLUMNS] = 0
 
 
+@kernel
+def begin_at(
+    # in
+    marks: ti.types.ndarray(dtype=ti.u8, ndim=3),  # [5, J, I]: 0 marks
+    kind: ti.i32,  # of the marks at which ways may begin too
+    before: ti.types.ndarray(dtype=ti.f32, ndim=2),  # [J, I] cells that were walked by then
+    # in / out
+    toll: Lengths,
+    way: Lengths,
+):
+    """Let ways begin about other marks as well, with what was walked before."""
+    for j, i in before:
+        if marks[kind, j, i] == 0:
+            toll[j + ROWS, i + COLUMNS] = 0
+            # a sample's spacing less for each of the two marks
+            walked = ti.max(before[j, i] - 1e-3 - SAMPLING, 0.0) * UNIT
+            walked = ti.min(walked, ti.cast(FAR, ti.f32))
+            for corner in ti.static(range(4)):
+                ti.atomic_min(
+                    way[j + ROWS + corner // 2, i + COLUMNS + corner % 2],
+                    ti.cast(ti.floor(walked), ti.i32),
+                )
+
+
 @ti.func
 def taken_from(array: ti.template(), j, i, lanes: ti.template()):
     """[lanes] of a row from column i on."""
