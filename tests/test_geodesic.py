@@ -17,7 +17,7 @@ from passpmp_ti import FutureModel, Settings, device
 from passpmp_ti.grid.arrival import rasterised
 from passpmp_ti.grid.geodesic import ways_from_sources
 from passpmp_ti.kernels.arrival import LANES, NEVER
-from passpmp_ti.kernels.beams import SHUT
+from passpmp_ti.kernels.beams import LOST, SHUT
 from passpmp_ti.kernels.geodesic import (
     COLUMNS,
     DIAGONAL,
@@ -136,29 +136,28 @@ def test_lengths_end_where_they_end_whoever_works_them_out():
 # what is open ----------------------------------------------------------------------------------
 
 
+def heading(views, v, beam):
+    """[n, 2] unit vectors along beams, or between two."""
+    bearing = views.view[v, 2] + views.view[v, 3] * beam
+    return np.stack([np.cos(bearing), np.sin(bearing)], axis=1)
+
+
 def walkable(views, generator, count):
     """[n, 2] places in device coordinates that the views prove empty, or before a shut wedge's
     chord."""
     found = []
     for v in range(views.scans):
         n = views.beams[v]
+        told = np.flatnonzero(views.met[v, :n] != LOST)
         w = generator.integers(0, n, count)
-        bearing = views.view[v, 2] + views.view[v, 3] * w
-        ends = []
-        for turn, far in (
-            (0.0, views.ranges[v, w]),
-            (views.view[v, 3], views.ranges[v, (w + 1) % n]),
-        ):
-            ends.append(
-                far[:, None] * np.stack([np.cos(bearing + turn), np.sin(bearing + turn)], 1)
-            )
-        share = generator.random((count, 1))
-        chord = ends[0] + share * (ends[1] - ends[0])
-        angle = bearing + share[:, 0] * views.view[v, 3]
-        proven = views.reach[v, w, None] * np.stack([np.cos(angle), np.sin(angle)], axis=1)
-        shut = (views.far_side[v, w] == SHUT) & (views.ranges[v, w] > 0)
-        shut &= views.ranges[v, (w + 1) % n] > 0
-        edge = np.where(shut[:, None], chord, proven)
+        share = generator.random(count)
+        # beams that are lost lie between two that are not
+        a = told[np.searchsorted(told, w, side="right") - 1]
+        b = told[np.searchsorted(told, w, side="right") % len(told)]
+        ends = [heading(views, v, beam) * views.ranges[v, beam, None] for beam in (a, b)]
+        chord = ends[0] + share[:, None] * (ends[1] - ends[0])
+        proven = heading(views, v, w + share) * views.reach[v, w, None]
+        edge = np.where(views.far_side[v, w, None] == SHUT, chord, proven)
         along = np.where(generator.random((count, 1)) < 0.7, 1.0, generator.random((count, 1)))
         found.append(views.view[v, :2] + along * edge)
     return np.concatenate(found)
@@ -177,7 +176,7 @@ def closed_share(case, places):
 
 
 def test_whatever_may_be_walked_through_is_open():
-    for seed in range(6):
+    for seed in range(8):
         generator = np.random.default_rng(seed)
         case = walkers.corridor_case(generator)
         closed, unseen = closed_share(case, walkable(case.model().views, generator, 3000))
@@ -288,15 +287,26 @@ def test_ways_that_turn_too_often_are_not_relied_on(monkeypatch):
     assert (case.model().ticks == plain).all()
 
 
-def test_a_device_finds_what_the_host_finds():
+@pytest.mark.parametrize("blind", [False, True])
+def test_a_device_finds_what_the_host_finds(blind):
     case = walkers.corridor_case(np.random.default_rng(0), cell=0.1)
-    shifted = tuple(p + d for p, d in zip(case.position, (0.3, -0.1, 0.2), strict=True))
-    scan = exact.sweep(case.world, shifted, 1440, 2 * np.pi, 6.0, 10.1)
+    places = [
+        case.position,
+        tuple(p + d for p, d in zip(case.position, (0.3, -0.1, 0.2), strict=True)),
+    ]
+    turn = 1.5 * np.pi if blind else 2 * np.pi
+    scans = [
+        exact.sweep(case.world, place, 1081, turn, 6.0, 10.0 + 0.1 * k)
+        for k, place in enumerate(places)
+    ]
+    settings = case.settings.changed(
+        blind_speed=0.0 if blind else None, clear_radius=0.85 if blind else 0.0
+    )
 
     def found():
-        first = case.model()
-        second = FutureModel.from_scan(scan, case.robot, case.settings, first)
-        return [device.host(m.ticks).tobytes() for m in (first, second)]
+        first = FutureModel.from_scan(scans[0], case.robot, settings)
+        second = FutureModel.from_scan(scans[1], case.robot, settings, first)
+        return [device.host(model.ticks).tobytes() for model in (first, second)]
 
     expected = found()
     assert found() == expected

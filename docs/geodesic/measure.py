@@ -1,6 +1,7 @@
 """What cones that follow walls buy, and what they cost: `python docs/geodesic/measure.py scans`.
 
-`scans` asks models of single scans; `drive SCENARIO SEED ...` drives. Both print rows of tables.
+`scans` asks models of single scans, `along SCENARIO CYCLES` models with a memory that see the same
+scans along one drive, `drive SCENARIO SEED ...` drives with either. All print rows of tables.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ import numpy as np
 
 import passpmp_ti as pti
 from passpmp_ti.grid.static_map import StaticMap
+from passpmp_ti.sim.episode import CycleInfo
 from passpmp_ti.sim.scenario import Scenario
 
 CORNER = str(Path(__file__).parent / "corner.yaml")
@@ -105,6 +107,34 @@ def _cost(scenario: Scenario, place: tuple[float, float]) -> float:
     return spent[1] / spent[0]
 
 
+def along(name: str, cycles: int) -> None:
+    """A row: both kinds of cones, each with its memory, along one drive."""
+    scenario = pti.load_scenario(name)
+    generator = np.random.default_rng(0)
+    models: dict[str, pti.FutureModel] = {}
+    later, safe = [], []
+
+    def see(info: CycleInfo) -> None:
+        for cones in CONES:
+            models[cones] = pti.FutureModel.from_scan(
+                info.scans, scenario.robot, scenario.settings.changed(cones=cones),
+                models.get(cones), scenario.static_map, position=tuple(info.state[:3]),
+            )  # fmt: skip
+        if round(info.time / scenario.settings.cycle) % 10 == 9:
+            straight, geodesic = (models[cones] for cones in CONES)
+            later.append((geodesic.ticks > straight.ticks)[straight.ticks > 0].mean())
+            states = moving_states(straight, generator)
+            times = np.full(STATES, straight.stamp + scenario.settings.cycle)
+            safe.append([m.passively_safe(states, times).mean() for m in (straight, geodesic)])
+
+    pti.simulate(replace(scenario, duration=cycles * scenario.settings.cycle), seed=0, on_cycle=see)
+    before, after = 100 * np.mean(safe, axis=0)
+    print(
+        f"| {Path(name).stem} | {100 * np.mean(later):.1f} % | {before:.2f} % | {after:.2f} % |",
+        flush=True,
+    )
+
+
 def drive(name: str, seeds: list[int]) -> None:
     """A row for each seed, without and with a map, with both kinds of cones."""
     for seed in seeds:
@@ -123,5 +153,7 @@ if __name__ == "__main__":
     pti.init("cpu", threads=1)
     if sys.argv[1:2] == ["drive"]:
         drive(sys.argv[2], [int(seed) for seed in sys.argv[3:]])
+    elif sys.argv[1:2] == ["along"]:
+        along(sys.argv[2], int(sys.argv[3]))
     else:
         scans()
