@@ -96,7 +96,7 @@ def arrival() -> np.ndarray:
 
     canvas = Canvas(bounds, (1180, 900))
     canvas.title("Arrival times of one scan", "objects ≤ 1.5 m/s, range 6 m")
-    _paint_arrival(canvas, model, model.ticks)
+    _paint_arrival(canvas, model)
     draw_robot(robot, state, canvas)
 
     entries = [
@@ -123,25 +123,17 @@ def arrival() -> np.ndarray:
 def cones() -> np.ndarray:
     """Arrival times as the crow flies, and round what stays, side by side."""
     scenario = load_scenario(Path(__file__).parent / "geodesic" / "corner.yaml")
-    state = np.array([4.5, 0.3, 0.0, 0.0, 0.0])
+    state = np.array([2.5, -0.3, 0.0, 0.0, 0.0])
     world, _, start = scenario.build(0)
     scans = [lidar.scan(world, state, start) for lidar in scenario.lidars]
-    straight, geodesic = (
-        pti.FutureModel.from_scan(
+    pages = []
+    for kind, note in (("straight", "as the crow flies"), ("geodesic", "round what stays")):
+        model = pti.FutureModel.from_scan(
             scans, scenario.robot, scenario.settings.changed(cones=kind), position=tuple(state[:3])
         )
-        for kind in ("straight", "geodesic")
-    )
-    later = geodesic.ticks.astype(int) - straight.ticks
-    pages = []
-    for title, model, ticks in (
-        ('cones="straight"', straight, straight.ticks),
-        ('cones="geodesic"', geodesic, geodesic.ticks),
-        ("Later by", geodesic, np.where(geodesic.ticks > 0, later, 0)),
-    ):
-        canvas = Canvas((-1.8, -3.7, 8.4, 3.7), (1000, 560))
-        canvas.title(title, f"bright: {LATEST:g} s and more")
-        _paint_arrival(canvas, model, ticks)
+        canvas = Canvas((-1.8, -3.7, 8.6, 3.7), (1180, 640))
+        canvas.title(f'cones="{kind}"', f"{note}; objects ≤ 1 m/s, bright: 2 s and later")
+        _paint_arrival(canvas, model)
         draw_robot(scenario.robot, state, canvas)
         x, _, w, _ = canvas.layout.plot
         pages.append(canvas.image()[:, : x + w + 20])
@@ -172,13 +164,13 @@ def region() -> np.ndarray:
     return np.concatenate(pages, axis=1)
 
 
-def _paint_arrival(canvas: Canvas, model: pti.FutureModel, ticks: np.ndarray) -> None:
-    """Colour every place by ticks [J, I] [ms], as when the robot could first be touched there; mark
-    what was seen."""
+def _paint_arrival(canvas: Canvas, model: pti.FutureModel) -> None:
+    """Colour every place by when the robot could first be touched there; mark what was seen."""
     j, i = _cells_of_pixels(canvas, model)
-    shade = np.clip(ticks[j, i] / (1000 * LATEST), 0, 1) * 255
+    ticks = model.ticks[j, i].astype(float)
+    shade = np.clip(ticks / (1000 * LATEST), 0, 1) * 255
     canvas.sheet[:] = _colours(shade.astype(np.uint8))
-    canvas.sheet[model.ticks[j, i] == 0] = palette.ICS
+    canvas.sheet[ticks == 0] = palette.ICS
     shade_unseen(model, canvas)
     for marked, colour in (
         (model.static, palette.STATIC),
