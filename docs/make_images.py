@@ -96,18 +96,7 @@ def arrival() -> np.ndarray:
 
     canvas = Canvas(bounds, (1180, 900))
     canvas.title("Arrival times of one scan", "objects ≤ 1.5 m/s, range 6 m")
-    j, i = _cells_of_pixels(canvas, model)
-    ticks = model.ticks[j, i].astype(float)
-    shade = np.clip(ticks / (1000 * LATEST), 0, 1) * 255
-    canvas.sheet[:] = _colours(shade.astype(np.uint8))
-    canvas.sheet[ticks == 0] = palette.ICS
-    shade_unseen(model, canvas)
-    for marked, colour in (
-        (model.static, palette.STATIC),
-        (model.movable, palette.MOVER),
-        (model.sources, palette.ROBOT),
-    ):
-        canvas.sheet[marked[j, i]] = colour
+    _paint_arrival(canvas, model)
     draw_robot(robot, state, canvas)
 
     entries = [
@@ -129,6 +118,26 @@ def arrival() -> np.ndarray:
     image = canvas.image()
     _colour_bar(image, (place[0], place[1] + place[3] - 60, place[2] - 8))
     return image
+
+
+def cones() -> np.ndarray:
+    """Arrival times as the crow flies, and round what stays, side by side."""
+    scenario = load_scenario(Path(__file__).parent / "geodesic" / "corner.yaml")
+    state = np.array([2.5, -0.3, 0.0, 0.0, 0.0])
+    world, _, start = scenario.build(0)
+    scans = [lidar.scan(world, state, start) for lidar in scenario.lidars]
+    pages = []
+    for kind, note in (("straight", "as the crow flies"), ("geodesic", "round what stays")):
+        model = pti.FutureModel.from_scan(
+            scans, scenario.robot, scenario.settings.changed(cones=kind), position=tuple(state[:3])
+        )
+        canvas = Canvas((-1.8, -3.7, 8.6, 3.7), (1180, 640))
+        canvas.title(f'cones="{kind}"', f"{note}; objects ≤ 1 m/s, bright: 2 s and later")
+        _paint_arrival(canvas, model)
+        draw_robot(scenario.robot, state, canvas)
+        x, _, w, _ = canvas.layout.plot
+        pages.append(canvas.image()[:, : x + w + 20])
+    return np.concatenate(pages, axis=1)
 
 
 def region() -> np.ndarray:
@@ -153,6 +162,22 @@ def region() -> np.ndarray:
         x, _, w, _ = canvas.layout.plot
         pages.append(canvas.image()[:, : x + w + 20])
     return np.concatenate(pages, axis=1)
+
+
+def _paint_arrival(canvas: Canvas, model: pti.FutureModel) -> None:
+    """Colour every place by when the robot could first be touched there; mark what was seen."""
+    j, i = _cells_of_pixels(canvas, model)
+    ticks = model.ticks[j, i].astype(float)
+    shade = np.clip(ticks / (1000 * LATEST), 0, 1) * 255
+    canvas.sheet[:] = _colours(shade.astype(np.uint8))
+    canvas.sheet[ticks == 0] = palette.ICS
+    shade_unseen(model, canvas)
+    for marked, colour in (
+        (model.static, palette.STATIC),
+        (model.movable, palette.MOVER),
+        (model.sources, palette.ROBOT),
+    ):
+        canvas.sheet[marked[j, i]] = colour
 
 
 def _cells_of_pixels(canvas: Canvas, model: pti.FutureModel) -> tuple[np.ndarray, np.ndarray]:
@@ -211,7 +236,7 @@ def palette_png(image: np.ndarray, colours: int = 256) -> bytes:
     )
 
 
-PICTURES = {"cycle": cycle, "arrival": arrival, "region": region, "eth": eth}
+PICTURES = {"cycle": cycle, "arrival": arrival, "cones": cones, "region": region, "eth": eth}
 
 
 if __name__ == "__main__":

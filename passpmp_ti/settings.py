@@ -10,6 +10,7 @@ from passpmp_ti.robots import CarLike, Robot
 
 MODES = ("conservative", "hybrid", "probabilistic")
 RISKS = ("any", "paper")
+CONES = ("straight", "geodesic")
 OPTIMIZERS = ("pso", "exhaustive")
 GUIDES = ("safe_time", "euclidean")
 DISTANCES = ("mean", "final")
@@ -36,6 +37,9 @@ class Settings:
     blind_speed: float | None = None
     """Greatest speed, from then on, of what was within range in a bearing that no sensor covers
     [m/s]; None: as `object_speed`; 0: what is there stands still for good, like a wall."""
+    cones: str = "straight"
+    """How what comes out of hiding is taken to come: "straight", as the crow flies; "geodesic":
+    round surfaces that stay, not through them. Conservative mode; `blind_speed` 0 or v_b."""
     clear_radius: float = 0.0
     """Disc about the robot's start that is declared empty [m]; for robots with blind sectors."""
 
@@ -136,6 +140,7 @@ class Settings:
         door.choice(name, "guide", self.guide, GUIDES)
         door.choice(name, "distance", self.distance, DISTANCES)
         door.choice(name, "risk", self.risk, RISKS)
+        door.choice(name, "cones", self.cones, CONES)
         self._check_chances()
         for field_ in (
             "object_speed",
@@ -173,6 +178,7 @@ class Settings:
                 f"Settings.blind_speed = {self.blind_speed:g} m/s is above object_speed ="
                 f" {self.object_speed:g} m/s, which bounds every object; leave it out or lower it"
             )
+        self._check_cones()
         if not isinstance(self.guide_movers, bool):
             raise ValueError(
                 f"Settings.guide_movers must be true or false; got {self.guide_movers!r}"
@@ -242,6 +248,22 @@ class Settings:
             raise ValueError(
                 f'Settings.mode = "{self.mode}" needs tracks, and where object_speed is 0 nothing'
                 ' moves that could be tracked; take mode="conservative"'
+            )
+
+    def _check_cones(self) -> None:
+        if self.cones == "straight":
+            return
+        if self.tracks:
+            raise ValueError(
+                f'Settings.cones = "{self.cones}" with mode = "{self.mode}": a tracked mover hides'
+                " what is behind it only until it moves on, so its surface must not bar a way; take"
+                ' cones="straight", or mode="conservative"'
+            )
+        if 0.0 < self.unseen_speed < self.object_speed:
+            raise ValueError(
+                f'Settings.cones = "{self.cones}" with blind_speed = {self.blind_speed:g} m/s and'
+                f" object_speed = {self.object_speed:g} m/s: ways are followed at one speed; leave"
+                ' blind_speed out, set it to 0, or take cones="straight"'
             )
 
     @classmethod

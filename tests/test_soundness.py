@@ -26,7 +26,11 @@ SEED = int(os.environ.get("PASSPMP_SEED", "10000"))
 def broken_proofs(seed, states_each, attackers_each):
     """(states asked, proofs given, descriptions of the proofs that an attacker breaks)."""
     generator = np.random.default_rng(seed)
-    case = cases.random_case(generator)
+    return broken_proofs_of(cases.random_case(generator), generator, states_each, attackers_each)
+
+
+def broken_proofs_of(case, generator, states_each, attackers_each):
+    """The same of one case."""
     model = case.model()
     attackers = hidden.hidden_discs(case, attackers_each, generator)
     states, times = cases.random_states(case, states_each, generator)
@@ -36,7 +40,7 @@ def broken_proofs(seed, states_each, attackers_each):
     for k, control in enumerate(case.robot.braking):
         mine = np.flatnonzero(proof == k)
         broken = attack.breaks(case, true_states[mine], times[mine], control, attackers)
-        found += [f"seed {seed}, state {n}, braking control {k}" for n in mine[broken]]
+        found += [f"state {n}, braking control {k}" for n in mine[broken]]
     return len(states), int((proof >= 0).sum()), found
 
 
@@ -44,7 +48,8 @@ def run(seeds, states_each, attackers_each, told_every=0):
     asked, proven, found = 0, 0, []
     for done, seed in enumerate(seeds, start=1):
         a, p, f = broken_proofs(seed, states_each, attackers_each)
-        asked, proven, found = asked + a, proven + p, found + f
+        found += [f"seed {seed}, {one}" for one in f]
+        asked, proven = asked + a, proven + p
         if f or (told_every and done % told_every == 0) or done == len(seeds):
             print(f"{asked} states, {proven} proven p-safe, {len(found)} broken", *f, flush=True)
     return asked, proven, found

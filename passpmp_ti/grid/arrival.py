@@ -8,6 +8,7 @@ import threading
 import numpy as np
 
 from passpmp_ti import device
+from passpmp_ti.grid.geodesic import ways_from_sources
 from passpmp_ti.grid.memory import (
     Memory,
     broken_premises,
@@ -19,6 +20,7 @@ from passpmp_ti.grid.view import Views
 from passpmp_ti.grid.window import Window
 from passpmp_ti.kernels.arrival import CHUNK, KINDS, LANES, arrival_times
 from passpmp_ti.kernels.beams import SLACK
+from passpmp_ti.kernels.geodesic import arrival_round_walls
 from passpmp_ti.kernels.visibility import BLIND_SOURCES, rasterise
 from passpmp_ti.robots import Robot
 from passpmp_ti.settings import Settings
@@ -134,9 +136,18 @@ def arrival(
     blind_speed = 0.0  # nothing is asked about where nothing is marked
     if _apart(settings) and (device.resident() or not marks[BLIND_SOURCES].all()):
         blind_speed = settings.unseen_speed
+    way = None
+    if settings.cones == "geodesic":
+        way = ways_from_sources(views, seen, marks, window, settings)
     arrival_times(
-        seen, marks, left, remembered, *shift, age, BORDER, _unseen_square(window.cell, clearance),
-        int(size > 0), window.cell, clearance, settings.object_speed, blind_speed,
-        settings.stamp_error, device.share(), *_scratch(window.size), ticks,
+        seen, marks, left, remembered, *shift, age if way is None else -1, BORDER,
+        _unseen_square(window.cell, clearance), int(size > 0), window.cell, clearance,
+        settings.object_speed, blind_speed, settings.stamp_error, device.share(),
+        *_scratch(window.size), ticks,
     )  # fmt: skip
+    if way is not None:
+        arrival_round_walls(
+            way, remembered, *shift, age, window.cell, clearance, settings.object_speed,
+            settings.stamp_error, ticks,
+        )  # fmt: skip
     return ticks, left, broken
