@@ -1,5 +1,4 @@
-"""`passpmp reproduce`: its options, and what it prints. Heavy imports stand inside the"
-" functions."""
+"""`passpmp reproduce`: options, and what it prints. Heavy imports stand inside the functions."""
 
 from __future__ import annotations
 

@@ -48,7 +48,9 @@ def snapshots(run: Run, count: int = PANELS) -> str:
     """A drive in some panels."""
     start = run.glimpses[0].time
     return strip(
-        [snapshot(run, g, f"{g.time - start:.1f} s") for g in run.spread(count)], min(count, 4)
+        run.scenario.name,
+        [snapshot(run, g, f"{g.time - start:.1f} s") for g in run.spread(count)],
+        min(count, 4),
     )
 
 
@@ -80,7 +82,7 @@ def run_simple(asked: Asked) -> Found:
             ),
             Claim(
                 says="so it does with a cycle of 2.4 s",
-                ours=f"{long['reached']} of {long['episodes']} goals, {long['driven']:.0f} m driven",
+                ours=f"{long['reached']} of {long['episodes']} goals in {long['driven']:.0f} m",
                 holds=long["reached"] == long["episodes"],
             ),
         ),

@@ -44,8 +44,8 @@ def _style() -> str:
     return "\n".join(
         [
             ":root {", *light, f"  font-family: {FONT}; background: var(--sheet);", "}",
-            "polyline { fill: none; stroke-linejoin: round; }", ".ics"
-            f" { shape-rendering: crispEdges; }",
+            "polyline { fill: none; stroke-linejoin: round; }", 
+            ".ics { shape-rendering: crispEdges; }",
             "text { fill: var(--ink); font-size: 13px; }", *marks, *filled, *drawn,
         ]
     )  # fmt: skip
@@ -56,7 +56,7 @@ def document(drawing: Drawing) -> str:
     return _whole(drawing.size, drawing.svg())
 
 
-def strip(drawings: Sequence[Drawing], columns: int) -> str:
+def strip(title: str, drawings: Sequence[Drawing], columns: int) -> str:
     """Drawings of one size side by side, row after row; each is cut at its edges."""
     wide, high = drawings[0].size
     rows = -(-len(drawings) // columns)
@@ -66,7 +66,7 @@ def strip(drawings: Sequence[Drawing], columns: int) -> str:
         x, y = n % columns * (wide + GAP), n // columns * (high + GAP)
         at = f'<svg x="{x:g}" y="{y:g}" width="{wide:g}" height="{high:g}" '
         placed.append(at + drawing.svg().removeprefix("<svg "))
-    told = Drawing(size, "").svg().removesuffix("</svg>")
+    told = Drawing(size, title).svg().removesuffix("</svg>")
     return _whole(size, told + "".join(placed) + "</svg>")
 
 

@@ -23,10 +23,7 @@ TREES = ((40, (0.5, 1.0, 1.5)), (1200, (0.5, 1.0, 1.5)), (20_000, (0.4, 0.6, 0.8
 def _drive(asked: Asked, name: str, seed: int, settings: dict[str, Any]) -> Run:
     """Nobody moves: who stands for long stays. Other drives go on to their end."""
     still = isinstance(load_scenario(name).movers, NobodyMoves)
-    if name == TRAP:
-        longest = LONGEST
-    else:
-        longest = math.inf
+    longest = LONGEST if name == TRAP else math.inf
     return asked.runs.drive(
         name, seed=seed, settings=settings or None, duration=min(longest, asked.longest),
         patience=PATIENCE if still else math.inf,
@@ -81,8 +78,8 @@ def tell_guides(numbers: Numbers) -> str:
         row: list[object] = [f"`{name}`"]
         for guide in GUIDES:
             r = by[name, guide]
-            row += [f"{r['reached']} of {r['episodes']}",
-                    None if r["time"] is None else f"{r['time']:.1f}", f"{r['driven']:.0f}"]  # fmt: skip
+            time = None if r["time"] is None else f"{r['time']:.1f}"
+            row += [f"{r['reached']} of {r['episodes']}", time, f"{r['driven']:.0f}"]
         row.append(sum(by[name, guide]["moving"] for guide in GUIDES))
         rows.append(row)
     rows += [

@@ -44,7 +44,7 @@ def run(asked: Asked) -> Found:
             },
         },
         Axis(low=0.0, high=55.0, label="bound on the speed of objects [m/s]"),
-        Axis(low=0.0, high=0.7, label="p-safe states", percent=True),
+        Axis(low=0.0, high=0.4, label="p-safe states", percent=True),
     )
     middle = shares[f"{SPEEDS[1]:g}"]
     return Found(

@@ -16,15 +16,16 @@ from passpmp_ti.reproduce.item import Asked, Claim, Found, Numbers, percent, tab
 from passpmp_ti.reproduce.runs import Run
 from passpmp_ti.reproduce.scene import Scene
 from passpmp_ti.settings import Settings
+from passpmp_ti.sim.world import Bounds
 from passpmp_ti.viz.branches import branches_of
 from passpmp_ti.viz.region import braking_ics
 
-AFTER = 3.5
+AFTER = 6.0
 """The cycle that is shown, after the start of `simple` [s]."""
 NODES = 240
 """Of the tree in the pictures: as many as the paper's largest (Table VI), and a small file."""
-HALF = 45.0
-"""Half of the picture's side [m]."""
+MARGIN = 1.25
+"""Side of a picture by that of the tree."""
 REGION_STATES = 8_000
 SMALL_SWARM = 15
 """Fig. 13: with so many particles the paper finds the optimum now and then."""
@@ -45,12 +46,10 @@ def _panel(
     run: Run, ground: Ground, tree: Tree, leaves: tuple[int, ...], best: int, title: str, full: bool
 ) -> Drawing:
     """The tree in its scene; `full`: with the region and what is not safe."""
-    x, y = (float(v) for v in ground.root[:2])
-    half = HALF if full else 0.6 * HALF
-    side = 620.0 if full else 300.0
-    # the car looks ahead
-    bounds = (x - 0.4 * half, y - half, x + 1.6 * half, y + half)
-    scene = Scene(bounds, title, side)
+    branches = branches_of(tree)
+    ways = branches.rejected if full and len(branches.rejected) else branches.safe
+    bounds = _around(np.concatenate([ways.reshape(-1, 2), ground.root[None, :2]]))
+    scene = Scene(bounds, title, 620.0 if full else 300.0)
     if full:
         speed = float(ground.robot.speed(ground.root))
         scene.region(
@@ -60,17 +59,26 @@ def _panel(
         )
     scene.world(run.world)
     scene.movers(run.world, ground.model.stamp)
-    branches = branches_of(tree)
     if full:
         scene.lines(branches.rejected[:, ::4], "unsafe")
-    scene.lines(branches.safe[:, ::4], "safe")
+    scene.lines(branches.safe[:, :: 4 if full else 8], "safe")
     scene.lines(branches.braking[:, ::4], "braking")
-    scene.lines(branches.through(tree, leaves)[:, ::2], "particle")
+    scene.lines(branches.through(tree, leaves)[:, ::4], "particle")
     scene.line(trajectory_to(tree, best).states[::4, :2], "choice")
     for goal in run.scenario.goals:
         scene.goal(goal)
     scene.robot(run.scenario.robot, run.nearest(AFTER).state)
     return scene.drawing()
+
+
+def _around(points: np.ndarray) -> Bounds:
+    """A square about some places [n, 2], with a margin [m]."""
+    low, high = points.min(axis=0), points.max(axis=0)
+    middle, half = 0.5 * (low + high), 0.5 * MARGIN * float((high - low).max())
+    return (
+        float(middle[0]) - half, float(middle[1]) - half,
+        float(middle[0]) + half, float(middle[1]) + half,
+    )  # fmt: skip
 
 
 def run_cycle(asked: Asked) -> Found:
@@ -174,7 +182,7 @@ def run_iterations(asked: Asked) -> Found:
             ),
         ),
         figures={
-            f"{SMALL_SWARM} particles: their ways in red, the best in green": strip(panels, 4),
+            f"{SMALL_SWARM} particles: their ways in red, the best in green": strip("Iterations of the swarm", panels, 4),
             "How far the best particle is above the optimum, mean of the searches":
                 document(drawing),
         },

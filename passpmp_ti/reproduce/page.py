@@ -26,10 +26,10 @@ from Bouraine & Azouaoui, Robotica, 2020, by the number of the table.
 **How to read it.** The paper gives no coordinates for its scenes, so they are ours: same sizes,
 numbers and limits, other places. Trends and orders can be compared, digits cannot. *Holds* tells
 whether what the paper says was found here; where it was not, the section says why. Speeds, contacts
-and distances are the simulator's truth, not the planner's belief. A contact counts as *moving* if the
-robot moved at any moment of it. Seeds draw the movers, or where the robot starts. Running times are
-of one thread of a machine that others used too. Six other planners in all scenarios, viability among
-them: [baselines.md](baselines.md); what each module does: [how-it-works.md](how-it-works.md).
+and distances are the simulator's truth, not the planner's belief. A contact counts as *moving* if
+the robot moved at any moment of it. Seeds draw the movers, or where the robot starts. Running times
+are of a machine that others used too. Other planners in all scenarios, viability among them:
+[baselines.md](baselines.md); what each step does: [how-it-works.md](how-it-works.md).
 """
 SLIPS_HEAD = """Where the printed text slips, and what is done here instead, is listed in
 [how-it-works.md](how-it-works.md#where-this-differs-from-the-paper). Four of the slips can be

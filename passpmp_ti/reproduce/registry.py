@@ -30,8 +30,8 @@ def _chair(item: str, title: str, scenario: str, says: str, **how: bool) -> Item
 TABLES = {
     "table3": Item(
         title="Table III: weights of distance and time",
-        paper="Best plans by six pairs of weights. From w_d = 0.3 on distance alone decides; with 0.2"
-        " the plan ends 4.5 m farther from the goal and takes 2.4 s less.",
+        paper="Best plans by six pairs of weights. From w_d = 0.3 on distance alone decides; with"
+        " 0.2 the plan ends 4.5 m farther from the goal and takes 2.4 s less.",
         run=weights.run_one_goal, tell=weights.tell_one_goal,
     ),
     "table4": Item(
@@ -47,8 +47,8 @@ TABLES = {
     ),
     "table6": Item(
         title="Table VI: length of the cycle, nodes and plan length",
-        paper="A longer cycle grows a larger tree and a longer plan; after 4.5 s unsafe regions slow"
-        " the growth; at 0.3 s the safety check does not end in time.",
+        paper="A longer cycle grows a larger tree and a longer plan; after 4.5 s unsafe regions"
+        " slow the growth; at 0.3 s the safety check does not end in time.",
         run=cycle_length.run, tell=cycle_length.tell,
     ),
     "table7": Item(
@@ -83,7 +83,7 @@ FIGURES = {
     ),
     "fig13": Item(
         title="Fig. 13: swarm sizes",
-        paper="Below 20 particles the optimum is missed; from 20 on it is found in 100 of 100 runs.",
+        paper="Below 20 particles the optimum may be missed; from 20 on 100 of 100 runs find it.",
         run=swarm_size.run, tell=swarm_size.tell,
     ),
     "fig14": Item(

@@ -66,7 +66,7 @@ class Run:
     def spread(self, count: int) -> list[Glimpse]:
         """Some glimpses at an even pace, the first and the last among them."""
         chosen = np.linspace(0, len(self.glimpses) - 1, min(count, len(self.glimpses)))
-        return [self.glimpses[int(round(k))] for k in chosen]
+        return [self.glimpses[round(k)] for k in chosen]
 
     def nearest(self, time: float) -> Glimpse:
         """The glimpse nearest to a time after the start [s]."""

@@ -20,6 +20,10 @@ BEFORE = 0.8
 """How long before the touch the first panel is [s]."""
 HALF = 25.0
 """Half of a panel's side [m]."""
+CAPTION = (
+    "ISS in `crowded`: blue, those of the 11 motions that are free of what it sees now; orange,"
+    " those that are not; green, the chosen one to rest"
+)
 SEEDS = 5
 """Episodes at least: ISS is cheap, and not every drive ends in a touch."""
 
@@ -47,8 +51,7 @@ def run(asked: Asked) -> Found:
             bounds = (x - HALF, y - HALF, x + HALF, y + HALF)
             title = f"{glimpse.time - touched.glimpses[0].time:.1f} s: {name}"
             panels.append(fan_panel(touched, glimpse, HORIZON, title, bounds))
-        figures["ISS in `crowded`: blue, the 11 motions that are free of what it sees now; orange,"
-                " those that are not; green, the chosen one to rest"] = strip(panels, 2)  # fmt: skip
+        figures[CAPTION] = strip("ISS in the crowd", panels, 2)
     return Found(
         numbers={"rows": rows},
         claims=(

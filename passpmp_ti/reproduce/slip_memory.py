@@ -36,7 +36,8 @@ def run(asked: Asked) -> Found:
         scenario = load_scenario(name).changed(object_speed=bound)
         scenario = replace(scenario, duration=min(longest, asked.longest))
         for forgets in (False, True):
-            row = {"scenario": name, "forgets": forgets, "cycles": 0, "lost": 0, "moving": 0}
+            row: dict[str, Any] = {"scenario": name, "forgets": forgets}
+            row |= {"cycles": 0, "lost": 0, "moving": 0}
             for seed in range(asked.seeds):
                 asked.see(f"memory: {name}, {'without' if forgets else 'with'}, seed {seed}")
                 watcher = _Forgetful(forgets)

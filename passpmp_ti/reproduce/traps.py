@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 from passpmp_ti.reproduce.crowds import row_of, snapshots, table_of
 from passpmp_ti.reproduce.figure import strip
@@ -21,7 +22,7 @@ SHORT_HORIZON = 1.1
 NO_WAY = "no motion is free"
 
 
-def _runs(asked: Asked, item: str, planner: str, **options: object) -> list[Run]:
+def _runs(asked: Asked, item: str, planner: str, **options: Any) -> list[Run]:
     runs = []
     for seed in range(asked.seeds):
         asked.see(f"{item}: {SCENARIO}, {planner}, seed {seed}")
@@ -34,7 +35,7 @@ def _runs(asked: Asked, item: str, planner: str, **options: object) -> list[Run]
                 patience=PATIENCE,
                 between=0.1 if planner == "iss" else 0.5,
                 **options,
-            )  # fmt: skip
+            )
         )
     return runs
 
@@ -60,6 +61,7 @@ def run_minimum(asked: Asked) -> Found:
         ),
         figures={
             "PASSPMP-PSO, then PASSPMP: executed in dark red, planned to rest in green": strip(
+                "Two planners in the U",
                 [
                     snapshot(run, run.glimpses[-1], f"{name}: {run.times[-1]:.0f} s")
                     for name, run in (("PASSPMP-PSO", ours[0]), ("PASSPMP", before[0]))
@@ -105,6 +107,7 @@ def run_no_way_out(asked: Asked) -> Found:
         figures={
             "ISS in the U: blue, the 11 motions that are free; orange, those that are not; green,"
             " the chosen one": strip(
+                "ISS in the U",
                 [
                     fan_panel(shown, g, SHORT_HORIZON, f"{g.time - shown.glimpses[0].time:.1f} s",
                               bounds)
