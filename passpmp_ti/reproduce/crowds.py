@@ -8,9 +8,12 @@ from passpmp_ti.reproduce import paper
 from passpmp_ti.reproduce.figure import strip
 from passpmp_ti.reproduce.item import Asked, Claim, Found, Numbers, percent, table
 from passpmp_ti.reproduce.runs import Run
-from passpmp_ti.reproduce.scene import snapshot
+from passpmp_ti.reproduce.scene import SIDE, snapshot
+from passpmp_ti.sim.world import Bounds
 
 PANELS = 4
+WIDE = 2.0
+"""Scenes at least so many times wider than high have a row each."""
 SHORT = 60.0
 """Longest drive with a long cycle [s]: it stands, and goes on standing."""
 
@@ -44,14 +47,16 @@ def table_of(rows: list[dict[str, Any]], first: str) -> str:
     )  # fmt: skip
 
 
-def snapshots(run: Run, count: int = PANELS) -> str:
-    """A drive in some panels."""
+def snapshots(run: Run, count: int = PANELS, bounds: Bounds | None = None) -> str:
+    """A drive in some panels; scenes that are much wider than high have a row of their own each."""
+    bounds = run.scenario.bounds if bounds is None else bounds
+    wide = bounds[2] - bounds[0] > WIDE * (bounds[3] - bounds[1])
     start = run.glimpses[0].time
-    return strip(
-        run.scenario.name,
-        [snapshot(run, g, f"{g.time - start:.1f} s") for g in run.spread(count)],
-        min(count, 4),
-    )
+    panels = [
+        snapshot(run, g, f"{g.time - start:.1f} s", bounds, 2 * SIDE if wide else SIDE)
+        for g in run.spread(count)
+    ]
+    return strip(run.scenario.name, panels, 1 if wide else min(count, 4))
 
 
 def run_simple(asked: Asked) -> Found:

@@ -24,7 +24,7 @@ AFTER = 6.0
 """The cycle that is shown, after the start of `simple` [s]."""
 NODES = 240
 """Of the tree in the pictures: as many as the paper's largest (Table VI), and a small file."""
-MARGIN = 1.25
+MARGIN = 1.3
 """Side of a picture by that of the tree."""
 REGION_STATES = 8_000
 SMALL_SWARM = 15
@@ -48,7 +48,8 @@ def _panel(
     """The tree in its scene; `full`: with the region and what is not safe."""
     branches = branches_of(tree)
     ways = branches.rejected if full and len(branches.rejected) else branches.safe
-    bounds = _around(np.concatenate([ways.reshape(-1, 2), ground.root[None, :2]]))
+    state = run.nearest(AFTER).state
+    bounds = _around(np.concatenate([ways.reshape(-1, 2), state[None, :2]]))
     scene = Scene(bounds, title, 620.0 if full else 300.0)
     if full:
         speed = float(ground.robot.speed(ground.root))
@@ -60,15 +61,20 @@ def _panel(
     scene.world(run.world)
     scene.movers(run.world, ground.model.stamp)
     if full:
-        scene.lines(branches.rejected[:, ::4], "unsafe")
-    scene.lines(branches.safe[:, :: 4 if full else 8], "safe")
-    scene.lines(branches.braking[:, ::4], "braking")
-    scene.lines(branches.through(tree, leaves)[:, ::4], "particle")
-    scene.line(trajectory_to(tree, best).states[::4, :2], "choice")
+        scene.lines(_thinned(branches.rejected, 3), "unsafe")
+    scene.lines(_thinned(branches.safe, 3), "safe")
+    scene.lines(_thinned(branches.braking, 3), "braking")
+    scene.lines(_thinned(branches.through(tree, leaves), 4), "particle")
+    scene.line(trajectory_to(tree, best).states[:, :2], "choice")
     for goal in run.scenario.goals:
         scene.goal(goal)
-    scene.robot(run.scenario.robot, run.nearest(AFTER).state)
+    scene.robot(run.scenario.robot, state)
     return scene.drawing()
+
+
+def _thinned(lines: np.ndarray, points: int) -> np.ndarray:
+    """[n, points, 2] of lines [n, m, 2], their ends among them."""
+    return lines[:, np.round(np.linspace(0, lines.shape[1] - 1, points)).astype(int)]
 
 
 def _around(points: np.ndarray) -> Bounds:
@@ -182,7 +188,8 @@ def run_iterations(asked: Asked) -> Found:
             ),
         ),
         figures={
-            f"{SMALL_SWARM} particles: their ways in red, the best in green": strip("Iterations of the swarm", panels, 4),
+            f"{SMALL_SWARM} particles: their ways in red, the best in green":
+                strip("Iterations of the swarm", panels, 4),
             "How far the best particle is above the optimum, mean of the searches":
                 document(drawing),
         },

@@ -92,7 +92,10 @@ def section(name: str, told: dict[str, Any] | None) -> str:
     parts = [f'<a id="{name}"></a>\n\n## {item.title}', f"*The paper:* {item.paper}"]
     if told is None:
         return "\n\n".join([*parts, f"Not run yet: `{COMMAND} {name}`."])
-    parts.append(item.tell(told["numbers"]))
+    try:
+        parts.append(item.tell(told["numbers"]))
+    except LookupError:  # a file of a version that measured something else
+        return "\n\n".join([*parts, f"Run by another version: `{COMMAND} {name}` runs it again."])
     for caption, file in told["figures"].items():
         parts += [f"![{item.title}]({IMAGES}/{file})", f"*{caption}.*"]
     claims = [[c["says"], c["ours"], c["holds"]] for c in told["claims"]]

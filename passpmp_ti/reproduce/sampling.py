@@ -13,7 +13,7 @@ from passpmp_ti.reproduce.crowds import row_of, table_of
 from passpmp_ti.reproduce.figure import strip
 from passpmp_ti.reproduce.item import Asked, Claim, Found, Numbers
 from passpmp_ti.reproduce.runs import Glimpse, Run
-from passpmp_ti.reproduce.scene import Scene
+from passpmp_ti.reproduce.scene import Scene, thinned
 from passpmp_ti.sim.world import Bounds
 
 BEFORE = 0.8
@@ -92,13 +92,13 @@ def fan_panel(run: Run, glimpse: Glimpse, horizon: float, title: str, bounds: Bo
     scene = Scene(bounds, title)
     scene.world(run.world)
     scene.movers(run.world, glimpse.time)
-    scene.line(run.trail_until(glimpse.time), "driven")
+    scene.line(thinned(run.trail_until(glimpse.time)), "driven")
     start = glimpse.time + scenario.settings.cycle
     for n in range(MOTIONS):
         way = motion.towards(glimpse.root, start, targets[n : n + 1], steps)
         kind = "safe" if free[n, STEPS] >= steps else "refused"
-        scene.line(way.states[: way.brakes_from + 1 : 4, :2], kind)
-    scene.line(glimpse.plan[::4], "choice")
+        scene.line(thinned(way.states[: way.brakes_from + 1, :2], 10), kind)
+    scene.line(thinned(glimpse.plan), "choice")
     for goal in scenario.goals:
         scene.goal(goal)
     scene.robot(scenario.robot, glimpse.state)

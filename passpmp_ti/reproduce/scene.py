@@ -114,13 +114,20 @@ class Scene:
         )
 
 
-def snapshot(run: Run, glimpse: Glimpse, title: str, bounds: Bounds | None = None) -> Drawing:
+def thinned(way: np.ndarray, step: int = 5) -> np.ndarray:
+    """One point in `step` of a way [n, 2], and its last."""
+    return np.concatenate([way[:-1:step], way[-1:]])
+
+
+def snapshot(
+    run: Run, glimpse: Glimpse, title: str, bounds: Bounds, width: float = SIDE
+) -> Drawing:
     """A moment of a drive: where the robot was, is, and means to go."""
-    scene = Scene(run.scenario.bounds if bounds is None else bounds, title)
+    scene = Scene(bounds, title, width)
     scene.world(run.world)
     scene.movers(run.world, glimpse.time)
-    scene.line(run.trail_until(glimpse.time)[::4], "driven")
-    scene.line(glimpse.plan[::4], "choice")
+    scene.line(thinned(run.trail_until(glimpse.time)), "driven")
+    scene.line(thinned(glimpse.plan), "choice")
     for goal in run.scenario.goals:
         scene.goal(goal)
     scene.robot(run.scenario.robot, glimpse.state)

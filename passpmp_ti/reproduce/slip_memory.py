@@ -9,7 +9,7 @@ from passpmp_ti.reproduce.item import Asked, Claim, Found, Numbers, table
 from passpmp_ti.sim.episode import CycleInfo, simulate
 from passpmp_ti.sim.scenario import load_scenario
 
-DRIVES = (("crowded", 5.0, 25.0), ("corridor_person", 1.0, 30.0))
+DRIVES = (("simple", 10.0, 20.0), ("nested_u", 5.0, 15.0), ("crowded", 5.0, 10.0))
 """(scenario, bound on objects [m/s], longest [s])."""
 
 
