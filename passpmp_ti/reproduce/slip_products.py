@@ -76,6 +76,7 @@ def run(asked: Asked) -> Found:
     numbers: Numbers = {
         "plans": len(printed), "none": int(none.sum()), "risky": int(risky.sum()),
         "both": int((risky & none).sum()), "allowed": scenario.settings.allowed_risk,
+        "median": float(np.median(chance[none])) if none.any() else 0.0,
         "worst": float(chance[none].max(initial=0.0)), "driven": driven, "drives": asked.seeds,
         "seconds": scenario.duration,
     }  # fmt: skip
@@ -102,7 +103,8 @@ def tell(numbers: Numbers) -> str:
         [f"w_ps as printed below {NOTHING:g}", numbers["none"]],
         [f"chance of any contact above {allowed}, which we refuse", numbers["risky"]],
         ["both", numbers["both"]],
-        ["greatest chance of any contact where w_ps is none", percent(numbers["worst"])],
+        ["chance of any contact where w_ps is none: median", percent(numbers["median"])],
+        ["the same: greatest", percent(numbers["worst"])],
         ["driven by the chance of any contact [m]", f"{driven['any']:.1f}"],
         ["driven by the printed equations [m]", f"{driven['paper']:.1f}"],
     ]
@@ -114,6 +116,7 @@ def tell(numbers: Numbers) -> str:
             " eq. 12 and over states of eq. 10 is the chance that *all* collide, and the minimum of"
             " eq. 17 that of the most harmless object. By eq. 9 such a plan costs nothing wherever"
             ' it leads, and standing costs as little. `risk="any"` is the chance of any contact,'
-            " bounded from above ([risk.md](risk.md)); the same plans are judged by both.",
+            " bounded from above and certain where nothing is forecast ([risk.md](risk.md)); the"
+            " same plans are judged by both.",
         ]
     )
