@@ -52,6 +52,7 @@ def run(given: argparse.Namespace) -> int:
     backend.init(threads=given.threads)
     folder = Path(given.out)
     asked = Asked(seeds=seeds, see=_see)
+    by = circumstances(given.threads)  # before files of the checkout change
     interrupted = False
     for name in names:
         began = time.perf_counter()
@@ -61,8 +62,7 @@ def run(given: argparse.Namespace) -> int:
             interrupted = True
             break
         made = {
-            "date": datetime.date.today().isoformat(), "seconds": time.perf_counter() - began,
-            **circumstances(given.threads),
+            "date": datetime.date.today().isoformat(), "seconds": time.perf_counter() - began, **by,
         }  # fmt: skip
         _see("")
         page.write(folder, name, asked, found, made)

@@ -24,6 +24,8 @@ CAPTION = (
     "ISS in `crowded`: blue, those of the 11 motions that are free of what it sees now; orange,"
     " those that are not; green, the chosen one to rest"
 )
+SAFE = {"passpmp-pso": "PASSPMP-PSO", "passpmp": "PASSPMP"}
+"""Planners that are driven beside it, with their names in the paper."""
 SEEDS = 5
 """Episodes at least: ISS is cheap, and not every drive ends in a touch."""
 
@@ -34,11 +36,13 @@ def run(asked: Asked) -> Found:
     for seed in range(max(asked.seeds, SEEDS)):
         asked.see(f"fig15: crowded, iss, seed {seed}")
         runs.append(asked.runs.drive("crowded", "iss", seed, duration=asked.longest, between=0.1))
-    safe = []
-    for seed in range(asked.seeds):
-        asked.see(f"fig15: crowded, passpmp-pso, seed {seed}")
-        safe.append(asked.runs.drive("crowded", seed=seed, duration=asked.longest))
-    rows = [row_of("ISS", runs), row_of("PASSPMP-PSO", safe)]
+    rows = [row_of("ISS", runs)]
+    for planner, name in SAFE.items():
+        safe = []
+        for seed in range(asked.seeds):
+            asked.see(f"fig15: crowded, {planner}, seed {seed}")
+            safe.append(asked.runs.drive("crowded", planner, seed, duration=asked.longest))
+        rows.append(row_of(name, safe))
     touched = next((r for r in runs if any(c.moving for c in r.contacts)), None)
     figures = {}
     if touched is not None:
@@ -57,9 +61,13 @@ def run(asked: Asked) -> Found:
         claims=(
             Claim(
                 says="ISS runs into a moving object while under way",
-                ours=f"{rows[0]['moving']} contacts while moving in {rows[0]['episodes']} drives;"
-                f" PASSPMP-PSO {rows[1]['moving']} in {rows[1]['episodes']}",
-                holds=rows[0]["moving"] > 0 and rows[1]["moving"] == 0,
+                ours=f"{rows[0]['moving']} contacts while moving in {rows[0]['episodes']} drives",
+                holds=rows[0]["moving"] > 0,
+            ),
+            Claim(
+                says="PASSPMP-PSO and PASSPMP do not",
+                ours=", ".join(f"{r['name']}: {r['moving']} in {r['episodes']}" for r in rows[1:]),
+                holds=not any(r["moving"] for r in rows[1:]),
             ),
         ),
         figures=figures,
