@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import statistics
 from typing import Any
 
 from passpmp_ti.reproduce import paper
@@ -14,6 +15,10 @@ from passpmp_ti.sim.world import Bounds
 PANELS = 4
 WIDE = 2.0
 """Scenes at least so many times wider than high have a row each."""
+CAPTION = (
+    "`simple`: executed in dark red, planned to rest in green; grey: braking ICS of the heading and"
+    " speed that the plan begins with, by that scan alone"
+)
 SHORT = 60.0
 """Longest drive with a long cycle [s]: it stands, and goes on standing."""
 
@@ -21,10 +26,10 @@ SHORT = 60.0
 def row_of(name: str, runs: list[Run]) -> dict[str, Any]:
     """Some runs in numbers, ready for JSON."""
     told = [run.summary for run in runs]
-    times = sorted(s["time_to_goal"] for s in told if s["reached_goal"])
+    times = [s["time_to_goal"] for s in told if s["reached_goal"]]
     return {
         "name": name, "episodes": len(told), "reached": len(times),
-        "time": times[len(times) // 2] if times else None,
+        "time": statistics.median(times) if times else None,
         "moving": sum(s["collisions_moving"] for s in told),
         "rest": sum(s["collisions_at_rest"] for s in told),
         "driven": sum(s["distance_driven"] for s in told),
@@ -47,13 +52,15 @@ def table_of(rows: list[dict[str, Any]], first: str) -> str:
     )  # fmt: skip
 
 
-def snapshots(run: Run, count: int = PANELS, bounds: Bounds | None = None) -> str:
+def snapshots(
+    run: Run, count: int = PANELS, bounds: Bounds | None = None, ics: bool = False
+) -> str:
     """A drive in some panels; scenes that are much wider than high have a row of their own each."""
     bounds = run.scenario.bounds if bounds is None else bounds
     wide = bounds[2] - bounds[0] > WIDE * (bounds[3] - bounds[1])
     start = run.glimpses[0].time
     panels = [
-        snapshot(run, g, f"{g.time - start:.1f} s", bounds, 2 * SIDE if wide else SIDE)
+        snapshot(run, g, f"{g.time - start:.1f} s", bounds, 2 * SIDE if wide else SIDE, ics)
         for g in run.spread(count)
     ]
     return strip(run.scenario.name, panels, 1 if wide else min(count, 4))
@@ -91,7 +98,7 @@ def run_simple(asked: Asked) -> Found:
                 holds=long["reached"] == long["episodes"],
             ),
         ),
-        figures={"`simple`: executed in dark red, planned to rest in green": snapshots(shown)},
+        figures={CAPTION: snapshots(shown, ics=True)},
     )
 
 

@@ -7,10 +7,9 @@ from typing import Any
 
 from passpmp_ti.reproduce.crowds import row_of
 from passpmp_ti.reproduce.item import Asked, Claim, Found, Numbers, table
-from passpmp_ti.reproduce.runs import Run
-from passpmp_ti.reproduce.traps import LONGEST, PATIENCE
+from passpmp_ti.reproduce.runs import PATIENCE, Run
+from passpmp_ti.reproduce.traps import LONGEST
 from passpmp_ti.sim.scenario import load_scenario, shipped
-from passpmp_ti.sim.sources import NobodyMoves
 
 GUIDES = ("safe_time", "euclidean")
 NEVER = ("dead_end",)
@@ -21,13 +20,11 @@ TREES = ((40, (0.5, 1.0, 1.5)), (1200, (0.5, 1.0, 1.5)), (20_000, (0.4, 0.6, 0.8
 
 
 def _drive(asked: Asked, name: str, seed: int, settings: dict[str, Any]) -> Run:
-    """Nobody moves: who stands for long stays. Other drives go on to their end."""
-    still = isinstance(load_scenario(name).movers, NobodyMoves)
+    """One drive; the U is given less time than its scenario gives it."""
     longest = LONGEST if name == TRAP else math.inf
     return asked.runs.drive(
-        name, seed=seed, settings=settings or None, duration=min(longest, asked.longest),
-        patience=PATIENCE if still else math.inf,
-    )  # fmt: skip
+        name, seed=seed, settings=settings or None, duration=min(longest, asked.longest)
+    )
 
 
 def run_guides(asked: Asked) -> Found:

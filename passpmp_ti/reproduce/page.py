@@ -27,7 +27,8 @@ from Bouraine & Azouaoui, Robotica, 2020, by the number of the table.
 numbers and limits, other places. Trends and orders can be compared, digits cannot. *Holds* tells
 whether what the paper says was found here; where it was not, the section says why. Speeds, contacts
 and distances are the simulator's truth, not the planner's belief. A contact counts as *moving* if
-the robot moved at any moment of it. Seeds draw the movers, or where the robot starts. Running times
+the robot moved at any moment of it. Seeds draw the movers, or where the robot starts. Where
+nobody moves, a robot that stood for 6 s is taken to stay, and the drive ends. Running times
 are of a machine that others used too. Other planners in all scenarios, viability among them:
 [baselines.md](baselines.md); what each step does: [how-it-works.md](how-it-works.md).
 """

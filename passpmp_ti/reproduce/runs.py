@@ -15,10 +15,13 @@ from passpmp_ti.sim.contacts import Contact
 from passpmp_ti.sim.episode import CycleInfo, simulate
 from passpmp_ti.sim.planners import planner_for
 from passpmp_ti.sim.scenario import Scenario, load_scenario
+from passpmp_ti.sim.sources import NobodyMoves
 from passpmp_ti.sim.world import World
 
 BETWEEN = 0.5
 """Time between two glimpses, at least [s]."""
+PATIENCE = 6.0
+"""Where nobody moves, a robot that stood for so long is taken to stay [s]."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -89,7 +92,7 @@ class Runs:
         settings: Mapping[str, Any] | None = None,
         object_speed: float | None = None,
         duration: float = math.inf,
-        patience: float = math.inf,
+        patience: float | None = None,
         between: float = BETWEEN,
         **options: Any,
     ) -> Run:
@@ -102,7 +105,8 @@ class Runs:
             settings: fields of `Settings` to replace.
             object_speed: see `Scenario.changed`.
             duration: at most [s].
-            patience: how long the robot may stand before the episode is ended [s].
+            patience: how long the robot may stand before the episode is ended [s]; None: `PATIENCE`
+                where nobody moves, else as long as it likes.
             between: time between glimpses [s].
             options: of the planner itself.
         """
@@ -110,6 +114,8 @@ class Runs:
         if repr(asked) in self._known:
             return self._known[repr(asked)]
         scenario = load_scenario(name).changed(settings, object_speed=object_speed)
+        if patience is None:
+            patience = PATIENCE if isinstance(scenario.movers, NobodyMoves) else math.inf
         scenario = replace(scenario, duration=min(duration, scenario.duration))
         made = partial(planner_for(planner, scenario, seed), **options)
         watcher = _Watcher(patience, between)

@@ -8,10 +8,11 @@ from collections.abc import Iterable
 import numpy as np
 
 from passpmp_ti.compare.svg import Drawing
+from passpmp_ti.grid.model import FutureModel
 from passpmp_ti.reproduce.runs import Glimpse, Run
 from passpmp_ti.robots import Robot
 from passpmp_ti.sim.world import Bounds, World
-from passpmp_ti.viz.region import Region
+from passpmp_ti.viz.region import Region, braking_ics
 
 SIDE = 300.0
 """Width of a panel [px]."""
@@ -21,6 +22,10 @@ ROUND = 16
 """Corners of what is drawn as a disc."""
 LEAST = 3.0
 """Least radius of a disc [px]."""
+STATES = 6_000
+"""Of a region."""
+CRAWLS = 0.1
+"""Slower than this, a robot has no braking ICS worth drawing [m/s]."""
 TAIL, TAIL_POINTS = 1.2, 5
 """Length of the trail behind what moves [s], and points of it."""
 
@@ -120,17 +125,34 @@ def thinned(way: np.ndarray, step: int = 5) -> np.ndarray:
 
 
 def snapshot(
-    run: Run, glimpse: Glimpse, title: str, bounds: Bounds, width: float = SIDE
+    run: Run, glimpse: Glimpse, title: str, bounds: Bounds, width: float = SIDE, ics: bool = False
 ) -> Drawing:
-    """A moment of a drive: where the robot was, is, and means to go."""
+    """A moment of a drive: where the robot was, is, and means to go.
+
+    Args:
+        run: the drive.
+        glimpse: of its cycle.
+        title: above the picture.
+        bounds: of the picture [m].
+        width: of the picture [px].
+        ics: draw the braking ICS of the heading and speed in which the plan begins, by the model
+            of that scan alone; a robot at rest has none.
+    """
     scene = Scene(bounds, title, width)
+    robot, settings = run.scenario.robot, run.scenario.settings
+    speed = float(robot.speed(glimpse.root))
+    if ics and abs(speed) > CRAWLS:
+        x, y, theta = (float(v) for v in glimpse.state[:3])
+        model = FutureModel.from_scan(glimpse.scans, robot, settings, position=(x, y, theta))
+        start = glimpse.time + settings.cycle
+        scene.region(braking_ics(model, bounds, float(glimpse.root[2]), speed, start, STATES))
     scene.world(run.world)
     scene.movers(run.world, glimpse.time)
     scene.line(thinned(run.trail_until(glimpse.time)), "driven")
     scene.line(thinned(glimpse.plan), "choice")
     for goal in run.scenario.goals:
         scene.goal(goal)
-    scene.robot(run.scenario.robot, glimpse.state)
+    scene.robot(robot, glimpse.state)
     return scene.drawing()
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 from passpmp_ti.reproduce import paper
@@ -23,7 +24,7 @@ def run(asked: Asked) -> Found:
             w_t = round(1 - w_d, 2)
             run = asked.runs.drive(
                 name, settings={**PAPERS, "weight_distance": w_d, "weight_time": w_t},
-                duration=min(SECONDS, asked.longest),
+                duration=min(SECONDS, asked.longest), patience=math.inf,
             )  # fmt: skip
             top = run.scenario.robot.top_speed
             rows.append(
