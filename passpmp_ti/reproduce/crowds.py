@@ -75,7 +75,7 @@ def run_simple(asked: Asked) -> Found:
         for seed in range(asked.seeds):
             asked.see(f"fig10: simple, seed {seed}, cycle {cycle or 0.1:g} s")
             settings = None if cycle is None else {"cycle": cycle}
-            longest = min(asked.longest, 90.0 if cycle is None else SHORT)
+            longest = asked.longest if cycle is None else min(SHORT, asked.longest)
             runs.append(asked.runs.drive("simple", seed=seed, settings=settings, duration=longest))
         name = f"{runs[0].scenario.settings.cycle:g} s"
         rows.append(row_of(name, runs))
@@ -120,7 +120,8 @@ def run_crowded(asked: Asked) -> Found:
     for bound, cycle in ((5.0, None), (None, None), (None, paper.LONG_CYCLES[0])):
         runs = []
         for seed in range(asked.seeds):
-            asked.see(f"fig12: crowded, seed {seed}, bound {bound or 20:g} m/s, {cycle or 0.1:g} s")
+            at_most = paper.TOP_SPEED if bound is None else bound
+            asked.see(f"fig12: crowded, seed {seed}, {at_most:g} m/s, cycle {cycle or 0.1:g} s")
             settings = None if cycle is None else {"cycle": cycle}
             longest = asked.longest if cycle is None else min(SHORT, asked.longest)
             runs.append(

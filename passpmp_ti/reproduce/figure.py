@@ -22,13 +22,13 @@ def _colour(colour: palette.Colour) -> str:
 
 _FILLED = {
     "ics": palette.ICS, "stays": palette.STATIC, "mover": palette.MOVER, "robot": palette.ROBOT,
-    "floor": palette.FLOOR, "goal": palette.GOAL, "touched": palette.CONTACT,
+    "floor": palette.FLOOR,
 }  # fmt: skip
 _DRAWN = {
     "wall": (palette.STATIC, 1.5), "trail": (palette.TRAIL, 2), "unsafe": (palette.UNSAFE, 0.6),
     "safe": (palette.SAFE, 0.6), "braking": (palette.BRAKING, 1), "particle": (palette.PARTICLE, 1),
     "choice": (palette.CHOICE, 2.2), "driven": (palette.EXECUTED, 1.8),
-    "refused": (palette.CONTACT, 1), "before": (palette.MUTED, 1.2), "frame": (palette.RULE, 1),
+    "refused": (palette.CONTACT, 1), "frame": (palette.RULE, 1), "front": (palette.FLOOR, 1.5),
 }  # fmt: skip
 
 

@@ -65,10 +65,10 @@ def _panel(
     scene.lines(_thinned(branches.safe, 3), "safe")
     scene.lines(_thinned(branches.braking, 3), "braking")
     scene.lines(_thinned(branches.through(tree, leaves), 4), "particle")
+    scene.robot(run.scenario.robot, state)
     scene.line(trajectory_to(tree, best).states[:, :2], "choice")
     for goal in run.scenario.goals:
         scene.goal(goal)
-    scene.robot(run.scenario.robot, state)
     return scene.drawing()
 
 
@@ -133,8 +133,7 @@ def tell_cycle(numbers: Numbers) -> str:
         f"A tree of {numbers['nodes']} nodes and {numbers['leaves']} plans, of which the 100"
         f" particles end in {numbers['plans']} different ones. Objects of at most"
         f" {numbers['object_speed']:g} m/s. The grey region is that of one heading and one speed; a"
-        " plan may lead through it at a lower one. The paper's region is the intersection over its"
-        " braking controls drawn for one speed as well."
+        " plan may lead into it, slower."
     )
 
 

@@ -40,7 +40,7 @@ class Glimpse:
     radius: np.ndarray
     """[n] [m]."""
     plan: np.ndarray
-    """[m, 2] way of what was chosen, to rest [m]."""
+    """[m, 2] what is left of the way that was chosen, to rest [m]."""
     reason: str
     """Of the decision, see `CycleRecord`."""
 
@@ -162,5 +162,6 @@ def glimpse_of(info: CycleInfo) -> Glimpse:
     return Glimpse(
         info.time, info.state, info.executing.at(info.time + info.navigator.settings.cycle),
         tuple(info.scans), movers.at(info.time)[present], movers.radius[present],
-        np.zeros((0, 2)) if chosen is None else chosen.states[:, :2], record.reason,
+        np.zeros((0, 2)) if chosen is None else chosen.states[chosen.times >= info.time, :2],
+        record.reason,
     )  # fmt: skip

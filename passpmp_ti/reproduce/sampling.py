@@ -106,8 +106,8 @@ def fan_panel(run: Run, glimpse: Glimpse, horizon: float, title: str, bounds: Bo
         way = motion.towards(glimpse.root, start, targets[n : n + 1], steps)
         kind = "safe" if free[n, STEPS] >= steps else "refused"
         scene.line(thinned(way.states[: way.brakes_from + 1, :2], 10), kind)
+    scene.robot(scenario.robot, glimpse.state)
     scene.line(thinned(glimpse.plan), "choice")
     for goal in scenario.goals:
         scene.goal(goal)
-    scene.robot(scenario.robot, glimpse.state)
     return scene.drawing()

@@ -83,13 +83,13 @@ class Scene:
         rim = np.asarray(place) + radius * np.stack([np.cos(turn), np.sin(turn)], axis=1)
         self._area(rim, kind)
 
-    def robot(self, robot: Robot, state: np.ndarray, kind: str = "robot") -> None:
+    def robot(self, robot: Robot, state: np.ndarray) -> None:
         """Its discs, with a line to its front."""
         ahead = np.array([math.cos(state[2]), math.sin(state[2])])
         for offset, radius in robot.discs:
-            self.disc(state[:2] + offset * ahead, radius, kind)
+            self.disc(state[:2] + offset * ahead, radius, "robot")
         length = max(robot.radius, LEAST / self.scale)
-        self.line([state[:2], state[:2] + 1.6 * length * ahead], "driven")
+        self.line([state[:2], state[:2] + length * ahead], "front")
 
     def goal(self, place: tuple[float, float]) -> None:
         """A cross."""
@@ -149,10 +149,10 @@ def snapshot(
     scene.world(run.world)
     scene.movers(run.world, glimpse.time)
     scene.line(thinned(run.trail_until(glimpse.time)), "driven")
+    scene.robot(robot, glimpse.state)
     scene.line(thinned(glimpse.plan), "choice")
     for goal in run.scenario.goals:
         scene.goal(goal)
-    scene.robot(robot, glimpse.state)
     return scene.drawing()
 
 

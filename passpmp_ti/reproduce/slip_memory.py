@@ -74,10 +74,10 @@ def tell(numbers: Numbers) -> str:
         [
             table(head, rows),
             "The proof of Property 3 takes it that a state found safe by W(t_k) cannot be unsafe by"
-            " W(t_k+1). A shadow that a mover throws over ground that was seen empty a moment ago"
-            " is unknown again to a model of one scan, though nothing can have got there so soon."
-            " The planner then finds its own plan unsafe and brakes without need. Both models are"
-            " sound, so the later of both arrival times is (see"
-            " [how-it-works.md](how-it-works.md)): with memory nothing is lost.",
+            " W(t_k+1). But a place that was seen empty a moment ago and lies in a shadow now,"
+            " behind a mover or a corner, is unknown again to a model of one scan, though nothing"
+            " can have got there so soon. The planner then finds its own plan unsafe, and brakes"
+            " without need. Both models are sound, and so is the later of both arrival times: with"
+            " that memory ([how-it-works.md](how-it-works.md)) nothing is lost.",
         ]
     )
