@@ -36,7 +36,7 @@ def runner(item: str, scenario: str, says: str, *, reaches: bool, waits: bool = 
         ours = f"{row['reached']} of {row['episodes']} goals, {row['moving']} contacts while moving"
         holds = row["moving"] == 0 and row["reached"] == (row["episodes"] if reaches else 0)
         if waits:
-            ours += f"; slowest under way: {max(stood):.2f} m/s or less"
+            ours += f"; on the way it slows to {max(stood):.2f} m/s or less"
             holds = holds and max(stood) < STANDS
         if not reaches:
             resting = sum(_rests(r) for r in runs)
@@ -78,7 +78,7 @@ def tell(numbers: Numbers) -> str:
             table_of(numbers["rows"], "scenario"),
             "In simulation, with a front and a rear range finder, cycles of"
             f" {numbers['cycle']:g} s and objects of at most {numbers['object_speed']:g} m/s; the"
-            f" paper drives a real chair, with one range finder and a cycle of"
+            " paper drives a real chair, with one range finder and a cycle of"
             f" {paper.CHAIR_CYCLE:g} s, among people, and tells what was seen. The layout is ours.",
         ]
     )

@@ -44,7 +44,7 @@ def _style() -> str:
     return "\n".join(
         [
             ":root {", *light, f"  font-family: {FONT}; background: var(--sheet);", "}",
-            "polyline { fill: none; stroke-linejoin: round; }", 
+            "polyline { fill: none; stroke-linejoin: round; }",
             ".ics { shape-rendering: crispEdges; }",
             "text { fill: var(--ink); font-size: 13px; }", *marks, *filled, *drawn,
         ]

@@ -31,7 +31,7 @@ class Asked:
 
 @dataclass(frozen=True, kw_only=True)
 class Claim:
-    """Something that the paper says, or the issue of this page, and what came of it here."""
+    """Something that is said, by the paper where not told otherwise, and what came of it here."""
 
     says: str
     ours: str

@@ -12,6 +12,7 @@ from typing import Any
 from passpmp_ti.bench.machine import told as machine_told
 from passpmp_ti.reproduce.item import Asked, Found, table
 from passpmp_ti.reproduce.registry import GROUPS, ITEMS
+from passpmp_ti.reproduce.runs import PATIENCE
 
 PAGE, NUMBERS, IMAGES = "reproduction.md", "reproduction", "images/reproduction"
 """In the folder: the page, one JSON file an item, the figures."""
@@ -27,9 +28,9 @@ from Bouraine & Azouaoui, Robotica, 2020, by the number of the table.
 numbers and limits, other places. Trends and orders can be compared, digits cannot. *Holds* tells
 whether what the paper says was found here; where it was not, the section says why. Speeds, contacts
 and distances are the simulator's truth, not the planner's belief. A contact counts as *moving* if
-the robot moved at any moment of it. Seeds draw the movers, or where the robot starts. Where
-nobody moves, a robot that stood for 6 s is taken to stay, and the drive ends. Running times
-are of a machine that others used too. Other planners in all scenarios, viability among them:
+the robot moved at any moment of it. Seeds draw the movers, or where the robot starts. Where nobody
+moves, a robot that stood for {PATIENCE:g} s is taken to stay, and the drive ends. Running times are
+of a machine that others used too. Other planners in all scenarios, viability among them:
 [baselines.md](baselines.md); what each step does: [how-it-works.md](how-it-works.md).
 """
 SLIPS_HEAD = """Where the printed text slips, and what is done here instead, is listed in
@@ -102,7 +103,7 @@ def section(name: str, told: dict[str, Any] | None) -> str:
     claims = [[c["says"], c["ours"], c["holds"]] for c in told["claims"]]
     parts.append(table(["said", "found here", "holds"], claims))
     parts.append(
-        f"`{COMMAND} {name}`, {told['seeds']} seeds, {told['seconds']:.0f} s on {told['date']};"
+        f"`{COMMAND} {name} --seeds {told['seeds']}`, {told['seconds']:.0f} s on {told['date']};"
         f" {machine_told(told)}."
     )
     return "\n\n".join(parts)

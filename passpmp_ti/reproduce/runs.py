@@ -35,10 +35,6 @@ class Glimpse:
     root: np.ndarray
     """[5] where it is at t_{k+1}: what the cycle planned from."""
     scans: tuple[Scan, ...]
-    movers: np.ndarray
-    """[n, 2] of those who are there [m]."""
-    radius: np.ndarray
-    """[n] [m]."""
     plan: np.ndarray
     """[m, 2] what is left of the way that was chosen, to rest [m]."""
     reason: str
@@ -156,12 +152,11 @@ class _Watcher:
 
 def glimpse_of(info: CycleInfo) -> Glimpse:
     """What is kept of a cycle."""
-    movers, record = info.world.movers, info.navigator.record
-    present = movers.present(info.time)
-    chosen = record.chosen
+    record = info.navigator.record
+    plan = np.zeros((0, 2))
+    if record.chosen is not None:
+        plan = record.chosen.states[record.chosen.times >= info.time, :2]
     return Glimpse(
         info.time, info.state, info.executing.at(info.time + info.navigator.settings.cycle),
-        tuple(info.scans), movers.at(info.time)[present], movers.radius[present],
-        np.zeros((0, 2)) if chosen is None else chosen.states[chosen.times >= info.time, :2],
-        record.reason,
+        tuple(info.scans), plan, record.reason,
     )  # fmt: skip

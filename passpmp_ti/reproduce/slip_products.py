@@ -16,7 +16,6 @@ from passpmp_ti.sim.scenario import load_scenario
 
 SCENARIO, OBJECT_SPEED, SECONDS = "crowded", 5.0, 6.0
 """(name, bound [m/s], length of a drive [s])."""
-PAPERS = {"mode": "probabilistic", "risk": "paper"}
 NOTHING = 1e-6
 """A risk that is called none."""
 EVERY, NODES, PLANS = 10, 240, 40

@@ -27,7 +27,9 @@ BEARINGS = tuple(range(-60, 61, 10))
 AWAY = (20.0, 40.0, 60.0, 90.0)
 """How far they are from it [m]."""
 WEIGHTS = tuple(round(0.1 * k, 1) for k in range(1, 10))
+"""w_d that are tried for each goal."""
 SMALL = 1e-6
+"""Costs that differ by less are equal [m, s]."""
 
 
 @dataclass(frozen=True)
@@ -51,12 +53,12 @@ def _settings(base: Settings) -> Settings:
     )
 
 
-def _tree(asked: Asked, goal: tuple[float, float] | None) -> tuple[Tree, tuple[float, float]]:
-    """The tree of the cycle towards a goal; None: the scenario's."""
+def _tree(asked: Asked) -> tuple[Tree, tuple[float, float]]:
+    """The tree of the cycle, and the scenario's goal [m]."""
     run = asked.runs.drive(
         SCENARIO, object_speed=OBJECT_SPEED, duration=min(AFTER + 0.2, asked.longest)
     )
-    goal = run.scenario.goals[0] if goal is None else goal
+    goal = run.scenario.goals[0]
     settings = _settings(run.scenario.settings)
     ground = Ground.of(run.nearest(AFTER), AcceleratingCar(), settings, goal)
     return ground.grow(settings), goal
@@ -65,10 +67,10 @@ def _tree(asked: Asked, goal: tuple[float, float] | None) -> tuple[Tree, tuple[f
 def run_one_goal(asked: Asked) -> Found:
     """Table III."""
     asked.see("table3: one tree, six pairs of weights")
-    tree, goal = _tree(asked, None)
+    tree, goal = _tree(asked)
     away, taken = leaf_distances(tree, goal)
     columns = [_choice(away, taken, w_d) for w_d in paper.WEIGHTS]
-    swarm = [_by_swarm(tree, goal, w_d, asked) for w_d in paper.WEIGHTS]
+    swarm = [_by_swarm(tree, goal, w_d) for w_d in paper.WEIGHTS]
     numbers: Numbers = {
         "nodes": tree.count, "leaves": len(away),
         **{key: [getattr(c, key) for c in columns] for key in ("cost_d", "cost_t", "f")},
@@ -97,7 +99,7 @@ def run_one_goal(asked: Asked) -> Found:
     )  # fmt: skip
 
 
-def _by_swarm(tree: Tree, goal: tuple[float, float], w_d: float, asked: Asked) -> float:
+def _by_swarm(tree: Tree, goal: tuple[float, float], w_d: float) -> float:
     """f of eq. 5 of what the swarm chooses, worked out as `_choice` does."""
     settings = _settings(tree.model.settings).changed(
         weight_distance=w_d, weight_time=round(1 - w_d, 1)
@@ -139,7 +141,7 @@ def run_many_goals(asked: Asked) -> Found:
     """Table IV."""
     rows: list[dict[str, Any]] = []
     asked.see("table4: one tree, many goals")
-    tree, _ = _tree(asked, None)
+    tree, _ = _tree(asked)
     x, y, heading = (float(v) for v in tree.on_host().states[0, :3])
     for bearing in BEARINGS:
         angle = heading + math.radians(bearing)
