@@ -57,7 +57,7 @@ def run(asked: Asked) -> Found:
             Claim(
                 says="the longer the cycle, the more nodes and the longer the plan",
                 ours=", ".join(
-                    f"objects of {bound:g} m/s: {by[bound, first]} nodes at {first:g} s,"
+                    f"nodes with objects of {bound:g} m/s: {by[bound, first]} at {first:g} s,"
                     f" {by[bound, last]} at {last:g} s"
                     for bound in BOUNDS
                 ),
