@@ -84,12 +84,12 @@ class Scene:
         self._area(rim, kind)
 
     def robot(self, robot: Robot, state: np.ndarray) -> None:
-        """Its discs, with a line to its front."""
+        """Its discs, with a line to its front where there is room for one."""
         ahead = np.array([math.cos(state[2]), math.sin(state[2])])
         for offset, radius in robot.discs:
             self.disc(state[:2] + offset * ahead, radius, "robot")
-        length = max(robot.radius, LEAST / self.scale)
-        self.line([state[:2], state[:2] + length * ahead], "front")
+        if robot.radius * self.scale > 2 * LEAST:
+            self.line([state[:2], state[:2] + robot.radius * ahead], "front")
 
     def goal(self, place: tuple[float, float]) -> None:
         """A cross."""
