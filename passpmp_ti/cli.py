@@ -17,6 +17,7 @@ from passpmp_ti import door
 from passpmp_ti.bench import command
 from passpmp_ti.benchmark import command as benchmarking
 from passpmp_ti.compare import command as comparing
+from passpmp_ti.reproduce import command as reproducing
 
 if TYPE_CHECKING:
     from passpmp_ti.sim.scenario import Scenario
@@ -178,6 +179,10 @@ def _bench(given: argparse.Namespace) -> int:
 
 def _compare(given: argparse.Namespace) -> int:
     return comparing.run(given, _settings(given))
+
+
+def _reproduce(given: argparse.Namespace) -> int:
+    return reproducing.run(given)
 
 
 def _attack(given: argparse.Namespace) -> int:
@@ -416,6 +421,15 @@ def _parser() -> argparse.ArgumentParser:
         )
     )
 
+    reproducing.add_options(
+        _command(
+            commands,
+            "reproduce",
+            "run the paper's tables and figures again, and put ours beside them",
+            _reproduce,
+            reproducing.EXAMPLE,
+        )
+    )
     _attack_options(
         _command(
             commands,

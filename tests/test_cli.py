@@ -4,7 +4,7 @@ from passpmp_ti.cli import BAD_INPUT, main
 
 COMMANDS = (
     ["run"], ["map"], ["attack"], ["faults"], ["verify"], ["bench"], ["bench", "cycle"],
-    ["compare"], ["scenarios"], [],
+    ["compare"], ["reproduce"], ["scenarios"], [],
 )  # fmt: skip
 
 
