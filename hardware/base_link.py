@@ -68,7 +68,7 @@ class BaseServer:
             # whoever says so
             self._base.stop()
             return
-        if message.session < self._session:
+        if not isinstance(body, (Drive, Reset)) or message.session < self._session:
             return
         self._session, self._driver = message.session, sender
         now = self._clock()

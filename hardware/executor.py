@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import select
 import time
 from collections import deque
@@ -31,6 +32,10 @@ ADDRESS = "executor"
 """Name of the socket for planner and sensors, in the executor's directory."""
 BUTTON = "stop"
 """Of the emergency stop's own socket."""
+LATCH = "stopped"
+"""Of the file that is there from an emergency stop to its reset: the next executor stops too."""
+RESET_WITHIN = 1.0
+"""[s]; who let the button go longer ago was told that it did not help, and may have gone."""
 
 
 class Tick(NamedTuple):
@@ -86,8 +91,11 @@ class Executor:
         self._recent: deque[Odometry] = deque(maxlen=MOST_ODOMETRY)
         self._button = Letterbox(directory / BUTTON)
         self._box = Letterbox(directory / ADDRESS)
+        self._latch = directory / LATCH
         self._stopping = False
         self._sent = 0
+        if self._latch.exists():
+            self.held.stop()
 
     @property
     def rests(self) -> bool:
@@ -113,6 +121,8 @@ class Executor:
             if now < due and not pressed:
                 continue
             self.tick()
+            if now < due:
+                continue  # one for the button is besides the others: however often it is pressed
             self.overruns += now > due + self._settings.period
             # a tick that was missed is not made up for
             due = max(due + self._settings.period, now)
@@ -125,11 +135,13 @@ class Executor:
             if message is None:
                 continue
             if isinstance(message.body, Stop):
+                heard |= self.held.state is not State.EMERGENCY
                 self.held.stop()
-                heard = True
-            elif isinstance(message.body, Reset):
+            elif isinstance(message.body, Reset) and self._fresh(message):
                 heard |= self.held.reset()
             self._answer(sender, message)
+        if heard:
+            self._remember()
         return heard
 
     def hear(self) -> None:
@@ -187,6 +199,18 @@ class Executor:
         self._base.close()
         self._button.close()
         self._box.close()
+
+    def _remember(self) -> None:
+        """Whether it was told to stop for good, for the executor after this one. The robot stops
+        whether or not that can be written."""
+        with contextlib.suppress(OSError):
+            if self.held.state is State.EMERGENCY:
+                self._latch.touch()
+            else:
+                self._latch.unlink(missing_ok=True)
+
+    def _fresh(self, message: Message) -> bool:
+        return abs(self._clock() - message.sent_at) <= RESET_WITHIN
 
     def _read(self, data: bytes) -> Message | None:
         try:

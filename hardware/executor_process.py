@@ -8,7 +8,9 @@ time. The process is started afresh, not forked: it holds nothing of the planner
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
+import fcntl
 import gc
 import importlib
 import json
@@ -18,6 +20,7 @@ import signal
 import struct
 import subprocess
 import sys
+import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -31,6 +34,8 @@ from hardware.follower import FollowerSettings
 from passpmp_ti import door
 from passpmp_ti.robots import DifferentialDrive
 
+PATIENCE = 10.0
+"""[s] for an executor whose planner died to come to rest, before the next one starts."""
 READY = b"ready\n"
 """What the process says once it listens."""
 ROW = struct.Struct(f"<{len(Tick._fields)}d")
@@ -195,6 +200,7 @@ def run(config: ExecutorConfig) -> None:
 
     for number in (signal.SIGTERM, signal.SIGINT):
         signal.signal(number, leave)
+    alone = _alone(config.directory)
     if config.priority:
         _put_first(config.priority)
     log = None if config.log is None else os.open(config.log, os.O_WRONLY | os.O_CREAT, 0o600)
@@ -210,6 +216,30 @@ def run(config: ExecutorConfig) -> None:
         executor.run(lambda: bool(asked) or os.getppid() != parent)
     finally:
         executor.close()
+        os.close(alone)
+
+
+def _alone(directory: Path) -> int:
+    """A descriptor that keeps all other executors out of a directory while it is open: two would
+    take each other's sockets away, and the button would reach only one.
+
+    Raises:
+        ValueError: one that is there does not end.
+    """
+    descriptor, until = os.open(directory, os.O_RDONLY), time.monotonic() + PATIENCE
+    while True:
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            if time.monotonic() > until:
+                os.close(descriptor)
+                raise ValueError(
+                    f"ExecutorConfig.directory = {directory}: another executor works there; end"
+                    " it, or give this one a directory of its own"
+                ) from None
+            time.sleep(0.05)
+        else:
+            return descriptor
 
 
 def _put_first(priority: int) -> None:
@@ -224,7 +254,9 @@ def _writer(log: int | None) -> Callable[[Tick], None] | None:
         return None
 
     def write(tick: Tick) -> None:
-        os.write(log, ROW.pack(*tick))
+        # a disk that is full is no reason to stop holding the robot's way to rest
+        with contextlib.suppress(OSError):
+            os.write(log, ROW.pack(*tick))
 
     return write
 

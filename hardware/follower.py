@@ -42,10 +42,13 @@ def moved_on(odometry: Odometry, time: float, track: float) -> Odometry:
     ahead = time - odometry.stamp
     speed, turn_rate = twist_of(odometry.right, odometry.left, track)
     middle = odometry.theta + 0.5 * turn_rate * ahead
+    if not math.isfinite(middle):
+        middle = math.nan  # a broken odometry's; infinity has no cosine, and would raise
+    c, sine = math.cos(middle), math.sin(middle)
     return odometry._replace(
         stamp=time,
-        x=odometry.x + speed * ahead * math.cos(middle),
-        y=odometry.y + speed * ahead * math.sin(middle),
+        x=odometry.x + speed * ahead * c,
+        y=odometry.y + speed * ahead * sine,
         theta=odometry.theta + turn_rate * ahead,
     )
 
@@ -84,7 +87,8 @@ def wheel_speeds(
         settings: gains.
 
     Returns:
-        (right, left) [m/s], within the limits. Zeros where the path is at rest, so that the robot
+        (right, left) [m/s], within the limits; NaN where the odometry's numbers are too great to
+        reckon with. Zeros where the path is at rest, so that the robot
         rests when it was proven to, not when it is where it should be.
 
     Source: C. Samson, "Control of chained systems: application to path following and time-varying
@@ -95,16 +99,21 @@ def wheel_speeds(
     if ahead[3:] == (0.0, 0.0, 0.0, 0.0):
         return 0.0, 0.0
     here, wanted = moved_on(odometry, time, limits.track), at(time)
+    if not math.isfinite(here.theta):
+        return math.nan, math.nan  # no angle has a cosine that is as great
     c, sine = math.cos(here.theta), math.sin(here.theta)
     dx, dy = wanted.x - here.x, wanted.y - here.y
     along, across = c * dx + sine * dy, c * dy - sine * dx
     off = math.remainder(wanted.theta - here.theta, math.tau)
     speed, _ = twist_of(wanted.right, wanted.left, limits.track)
-    stiffness = min(s.across, (s.swing / speed) ** 2) if speed else 0.0
+    # a quotient by next to nothing has no square
+    stiffness = min(math.sqrt(s.across), s.swing / abs(speed)) ** 2 if speed else 0.0
     straight = math.sin(off) / off if off else 1.0
     correction = wheels_of(
         s.along * along, stiffness * speed * straight * across + s.turning * off, limits.track
     )
+    if not all(map(math.isfinite, correction)):
+        return math.nan, math.nan  # a limit would make a number of it
     planned = (
         _leading(s.wheel_lag, ahead.right, ahead.right_rate),
         _leading(s.wheel_lag, ahead.left, ahead.left_rate),

@@ -41,6 +41,7 @@ class Letterbox:
         for option in (socket.SO_RCVBUF, socket.SO_SNDBUF):
             self._socket.setsockopt(socket.SOL_SOCKET, option, BUFFER)
         self._socket.bind(os.fsencode(address))
+        self._own = _identity(address)
 
     def fileno(self) -> int:
         """For `select`."""
@@ -67,7 +68,13 @@ class Letterbox:
         return letters
 
     def close(self) -> None:
-        """Nothing comes any more."""
+        """Nothing comes any more. What another has put at the address since is left to it."""
         self._socket.close()
         with contextlib.suppress(OSError):
-            self.address.unlink(missing_ok=True)
+            if _identity(self.address) == self._own:
+                self.address.unlink()
+
+
+def _identity(address: Path) -> tuple[int, int]:
+    there = address.lstat()
+    return there.st_dev, there.st_ino

@@ -20,6 +20,8 @@ from hardware.status import State, Status
 
 PATIENCE = 1.0
 """[s] to wait for the executor to say that it heard."""
+AGAIN = 0.05
+"""[s] after which it is told once more."""
 
 
 class StopButton:
@@ -48,19 +50,24 @@ class StopButton:
         return state is not None and state is not State.EMERGENCY
 
     def _say(self, body: Stop | Reset) -> State | None:
-        self._sent += 1
-        until = time.monotonic() + PATIENCE
-        message = Message(self._session, self._sent, time.monotonic(), body)
-        self._box.post(self._to, message.encode())
-        state = None
-        while state is None and (left := until - time.monotonic()) > 0.0:
-            select.select([self._box], [], [], left)
+        began = time.monotonic()
+        until, state, arrived = began + PATIENCE, None, False
+        while state is None and time.monotonic() < until:
+            # a box that is full, or not there yet, loses what is sent. Two resets could let go
+            # what somebody pressed between them.
+            if not arrived or isinstance(body, Stop):
+                self._sent += 1
+                message = Message(self._session, self._sent, time.monotonic(), body)
+                arrived = self._box.post(self._to, message.encode())
+            select.select([self._box], [], [], AGAIN)
             for data, _ in self._box.collect():
                 try:
                     heard = decode(data)
                 except MessageError:
                     continue
-                if isinstance(heard.body, Status) and heard.session == self._session:
+                if not isinstance(heard.body, Status) or heard.session != self._session:
+                    continue
+                if heard.body.stamp >= began:  # not what was answered to an earlier one
                     state = heard.body.state
         return state
 

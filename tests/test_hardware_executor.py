@@ -9,6 +9,7 @@ from hypothesis import given
 from hypothesis import settings as searching
 from hypothesis import strategies as st
 
+from hardware.admission import judge
 from hardware.base import BaseLimits, Odometry
 from hardware.executor_settings import ExecutorSettings
 from hardware.executor_trials import motion
@@ -226,6 +227,53 @@ def too_fast(t):
     return Trajectory(
         t.times[0] + (t.times - t.times[0]) / 2, t.states * [1, 1, 1, 2, 2], t.brakes_from
     )
+
+
+def along_a_line(speeds, step, heading=0.0, sense=1.0):
+    """Straight on from the origin at these speeds [m/s], `step` [s] apart; the body may look
+    elsewhere, and the place may move the other way."""
+    speeds = np.asarray(speeds)
+    way = sense * np.concatenate([[0.0], np.cumsum(0.5 * (speeds[1:] + speeds[:-1]) * step)])
+    still = 0.0 * way
+    states = np.stack([way, still, still + heading, speeds, speeds], axis=1)
+    return Trajectory(10.0 + step * np.arange(len(speeds)), states, 0)
+
+
+HILL = np.concatenate([np.arange(20), np.arange(20, -1, -1)]) * 0.05
+
+
+@pytest.mark.parametrize(
+    ("trajectory", "verdict"),
+    [
+        (along_a_line(HILL, 0.05), Verdict.TAKEN),
+        (along_a_line(HILL, 0.05, heading=math.pi / 2), Verdict.BEYOND_LIMITS),
+        (along_a_line(HILL, 0.05, sense=-1.0), Verdict.BEYOND_LIMITS),
+        # 5 m/s^2: each step within what rounding may do to one, not all of them together
+        (along_a_line(HILL / 10, 0.001), Verdict.BEYOND_LIMITS),
+        (along_a_line(HILL / 10, 0.005), Verdict.TAKEN),
+    ],
+)
+def test_a_motion_goes_where_its_wheels_go_however_short_its_steps(trajectory, verdict):
+    assert judge(trajectory, ROBOT) is verdict
+
+
+@pytest.mark.parametrize("wheels", [(1.7e308, -1.7e308), (1.7e308, 1.7e308), (-1.7e308, 0.0)])
+def test_odometry_with_numbers_that_are_too_great_makes_it_brake(wheels):
+    bench = moving()
+    there = bench.held.at(bench.now)
+    bench.held.step(bench.now, Odometry(bench.now, *there[:3], *wheels))
+    if bench.held.state is State.BRAKING:
+        assert bench.held.reason is Reason.NO_ORDER
+    assert all(map(math.isfinite, bench.held.order))
+
+
+def test_a_path_that_hardly_moves_is_followed():
+    bench = resting()
+    place, start = bench.held.at(bench.now), bench.now + 0.05
+    states = np.add([*place[:5]], [[0, 0, 0, v, v] for v in (0.0, 1e-200, 1e-200, 0.0)])
+    assert bench.send(Trajectory(start + 0.05 * np.arange(4), states, 0)) is Verdict.TAKEN
+    bench.run(0.5)
+    assert bench.held.state is State.RESTING
 
 
 @pytest.mark.parametrize(

@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from oracle import exact
 
 from hardware.base import Odometry
-from hardware.executor import ADDRESS
-from hardware.executor_fuzz import ROBOT, Chain, fuzz, right_messages
+from hardware.executor import ADDRESS, BUTTON, Executor
+from hardware.executor_fuzz import NOW, ROBOT, Chain, fuzz, right_messages
 from hardware.executor_settings import ExecutorSettings
 from hardware.executor_trials import motion
 from hardware.held import OWN
@@ -35,7 +35,9 @@ from hardware.messages import (
     Torn,
     decode,
 )
+from hardware.simulated_base import SimulatedBase
 from hardware.status import Reason, State, Status, Verdict
+from hardware.stop_button import StopButton
 from passpmp_ti import Navigator, Settings, Trajectory
 
 NUMBERS = st.floats(allow_nan=False, width=64)
@@ -144,6 +146,16 @@ def test_a_letterbox_takes_over_from_one_that_was_killed(tmp_path):
     assert killed.collect() == []
     for one in (box, other):
         one.close()
+
+
+def test_a_letterbox_that_closes_leaves_its_successors_alone(tmp_path):
+    old = Letterbox(tmp_path / "box")
+    box, other = Letterbox(tmp_path / "box"), Letterbox(tmp_path / "other")
+    old.close()
+    assert other.post(tmp_path / "box", b"x")
+    box.close()
+    assert not (tmp_path / "box").exists()
+    other.close()
 
 
 def test_a_name_that_is_too_long_for_a_socket_is_refused(tmp_path):
@@ -274,6 +286,91 @@ def test_a_flood_keeps_the_executor_from_nothing(chain):
     assert chain.executor.garbled > 300
     assert chain.executor.held.state in (State.FOLLOWING, State.CARRYING_ON)
     assert chain.executor.held.error < 0.02
+
+
+def tell_button(chain, body, sent_at=None):
+    """As the emergency stop's button; the executor hears it."""
+    sent_at = chain.now if sent_at is None else sent_at
+    assert chain.stranger.post(chain.directory / BUTTON, Message(1, 1, sent_at, body).encode())
+    chain.executor.hear_button()
+
+
+def another_executor(chain):
+    return Executor(chain.remote, ROBOT, ExecutorSettings(), chain.directory, clock=chain.clock)
+
+
+def test_an_executor_that_is_started_again_knows_of_the_emergency_stop(chain):
+    tell_button(chain, Stop())
+    again = another_executor(chain)
+    assert again.held.state is State.EMERGENCY
+    chain.executor, old = again, chain.executor
+    for _ in range(50):
+        chain.tick()
+    assert again.held.state is State.EMERGENCY
+    tell_button(chain, Reset())
+    assert again.held.state is State.STOPPED
+    assert another_executor(chain).held.state is State.STOPPED
+    old.close()
+
+
+def test_a_reset_that_lay_about_lets_nothing_go(chain):
+    tell_button(chain, Stop())
+    for sent_at in (chain.now - 1.1, chain.now + 5.0, math.nan):
+        tell_button(chain, Reset(), sent_at)
+        assert chain.executor.held.state is State.EMERGENCY
+    tell_button(chain, Reset())
+    assert chain.executor.held.state is State.STOPPED
+
+
+def test_pressing_often_does_not_put_the_next_ticks_off(tmp_path):
+    ticks, calls, now = [], 0, NOW
+    base = SimulatedBase(rng=np.random.default_rng(0), clock=lambda: now)
+    executor = Executor(
+        base, ROBOT, ExecutorSettings(), tmp_path, clock=lambda: now, log=ticks.append
+    )
+    finger = Letterbox(tmp_path / "finger")
+
+    def leave():
+        nonlocal calls, now
+        now, calls = now + 0.005, calls + 1
+        for body in (Stop(), Reset()) if calls <= 100 else ():
+            finger.post(tmp_path / BUTTON, Message(1, 1, now, body).encode())
+        finger.collect()
+        return calls > 200
+
+    executor.run(leave)
+    executor.close()
+    finger.close()
+    pressed = sum(tick.time <= NOW + 0.5 for tick in ticks)
+    assert pressed > 90
+    assert len(ticks) - pressed > 40
+
+
+def test_a_press_that_finds_the_box_full_is_pressed_again(chain, monkeypatch):
+    monkeypatch.setattr("hardware.stop_button.PATIENCE", 20.0)
+    monkeypatch.setattr(chain.executor, "_clock", time.monotonic)
+    with StopButton(chain.directory) as button:
+        posts, post = [], button._box.post
+
+        def full_at_first(to, data):
+            posts.append(data)
+            arrives = len(posts) > 2 and post(to, data)
+            chain.executor.hear_button()
+            return arrives
+
+        monkeypatch.setattr(button._box, "post", full_at_first)
+        assert button.press()
+    assert len(posts) == 3
+
+
+def test_who_drives_is_not_decided_by_what_is_no_order(chain):
+    stray = Message(2**63, 1, chain.now, Ask()).encode()
+    assert chain.stranger.post(chain.server._box.address, stray)
+    trajectory = a_motion(chain)
+    chain.link.offer(trajectory)
+    while chain.now < trajectory.start + 0.5:
+        chain.tick()
+    assert chain.executor.held.state in (State.FOLLOWING, State.CARRYING_ON)
 
 
 def test_no_wall_clock_is_read(chain, monkeypatch):

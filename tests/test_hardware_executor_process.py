@@ -4,6 +4,7 @@ Bounds are on the monotonic stamps of the base and of the executor itself. Where
 still, that long is allowed on top. Long form: pytest -m campaign.
 """
 
+import fcntl
 import json
 import os
 import signal
@@ -90,6 +91,16 @@ def test_the_button_has_its_own_way_and_the_sockets_are_for_this_user_only(tmp_p
         process.close()
         assert process.process.returncode == 0
         assert list(directory.glob("executor")) == []
+
+
+def test_a_second_executor_waits_for_the_first_and_is_refused_while_it_stays(tmp_path):
+    first = os.open(tmp_path, os.O_RDONLY)
+    fcntl.flock(first, fcntl.LOCK_EX)
+    with pytest.raises(RuntimeError, match="another executor"):
+        ExecutorProcess(config(tmp_path))
+    os.close(first)
+    with ExecutorProcess(config(tmp_path, log=tmp_path / "log")) as process:
+        assert process.alive
 
 
 def test_a_moving_robot_comes_to_rest_when_something_fails_or_it_is_asked_to_end():
