@@ -48,7 +48,7 @@ class ChairNature:
     """By how much the right and the left wheel are larger than `WHEEL_RADIUS`, as a share."""
     torque: float = 60.0
     """Greatest, of a wheel's motor [N m]."""
-    gains: tuple[float, float, float] = (40.0, 80.0, 0.0)
+    gains: tuple[float, float, float] = (200.0, 600.0, 0.0)
     """Of a wheel's speed loop, on its speed over ground: proportional [N m/(m/s)], integral
     [N m/m], derivative [N m/(m/s^2)]."""
     rolling: float = 1.0
@@ -92,8 +92,8 @@ class ChairNature:
         return cls(
             mass=float(rng.uniform(110.0, 140.0)),
             ahead=float(rng.uniform(0.08, 0.12)),
-            friction=float(rng.uniform(0.5, 0.9)),
-            slippery=0.3,
+            friction=float(rng.uniform(0.7, 0.9)),
+            slippery=0.2,
             radius_error=(float(right), float(left)),
             rolling=float(rng.uniform(0.5, 2.0)),
             pose_noise=0.002, heading_noise=0.002, speed_noise=0.004,
@@ -104,7 +104,8 @@ def mjcf(world: World, nature: ChairNature) -> str:
     """The model's text: a floor, the world's fixed surfaces as thin tall walls, its movers as
     mocap cylinders, and the chair.
 
-    Casters and anti-tippers are spheres without friction: they carry, and do not steer. Nobody
+    Casters and anti-tippers are spheres without friction: they carry, and do not steer. The casters
+    hang on a fork that rolls, so that both driven wheels carry, however large they are. Nobody
     pushes the chair: whether people and chair touch is for a judge to say, and who walks by a
     clock would drive a standing chair before him.
     """
@@ -145,20 +146,23 @@ def _chair(nature: ChairNature) -> str:
     """Its frame: midway between the driven wheels, at the height of their axle. All of it lies
     within 0.4 m of that, which is the disc that is planned with."""
     wheels = 0.06 * nature.mass
-    body = nature.mass - 2 * wheels
+    body = nature.mass - 2 * wheels - 1.0  # the fork
     # the wheels' masses stand on the axle; the rest brings the whole's centre where it should be
     ahead = nature.ahead * nature.mass / body
     up = (nature.height - WHEEL_RADIUS) * nature.mass / body
     own = f'group="{CHAIR_GROUP}"'
     small, lifted = 0.05, 0.004
     low = small - WHEEL_RADIUS
-    spheres = "".join(
-        f'<geom name="{name}{side}" type="sphere" size="{small}" mass="0" condim="1" priority="2"'
-        f' pos="{x} {y} {low + lift}" {own}/>'
-        for name, x, lift in (("caster", 0.27, 0.0), ("tipper", -0.27, lifted))
-        for side, y in (("r", -0.17), ("l", 0.17))
-        if name == "caster" or nature.anti_tippers
-    )
+
+    def sphere(name: str, x: float, y: float, z: float) -> str:
+        return (
+            f'<geom name="{name}" type="sphere" size="{small}" mass="0" condim="1" priority="2"'
+            f' pos="{x} {y} {z}" {own}/>'
+        )
+
+    sides = (("r", -0.17), ("l", 0.17))
+    casters = "".join(sphere(f"caster{side}", 0.0, y, low) for side, y in sides)
+    tippers = "".join(sphere(f"tipper{side}", -0.27, y, low + lifted) for side, y in sides)
     driven = "".join(
         f'<body name="{name}" pos="0 {side * 0.5 * nature.limits.track} 0">'
         f'<joint name="{name}" type="hinge" axis="0 1 0" armature="0.05"'
@@ -177,5 +181,10 @@ def _chair(nature: ChairNature) -> str:
        diaginertia="{thick[1]} {thick[1]} {thick[0]}"/>
       <geom name="frame" type="box" size="0.25 0.22 0.15" pos="0 0 0.12" mass="0" {own}/>
       <geom name="seat" type="box" size="0.2 0.2 0.3" pos="0 0 0.6" mass="0" {own}/>
-      {spheres}{driven}
+      {tippers if nature.anti_tippers else ""}{driven}
+      <body name="fork" pos="0.27 0 0">
+        <joint type="hinge" axis="1 0 0" pos="0 0 {low}" range="-8 8" damping="2"/>
+        <inertial pos="0 0 {low}" mass="1" diaginertia=".03 .01 .03"/>
+        {casters}
+      </body>
     </body>"""

@@ -37,7 +37,6 @@ from passpmp_ti.scan import Scan
 from passpmp_ti.sim.contacts import Contact
 from passpmp_ti.sim.drive import Drive
 from passpmp_ti.sim.episode import episode_of
-from passpmp_ti.sim.scenario import load_scenario
 
 NOWHERE: Pose = (0.0, 0.0, 0.0)
 """A range finder's pose at a time of which nothing is known; such scans are dropped."""
@@ -70,19 +69,32 @@ class Look:
 class Chain:
     """All of it, running: twin, executor, clients and navigator."""
 
-    def __init__(self, scenario: str, *, seed: int = 0, cycle: float = 0.4) -> None:
+    def __init__(
+        self,
+        scenario: str,
+        *,
+        seed: int = 0,
+        cycle: float = 0.4,
+        object_speed: float | None = None,
+    ) -> None:
         """
         Args:
             scenario: a shipped name, or a file, with a differential drive and lidars that turn 270
                 degrees.
             seed: of everything random.
             cycle: of the planner [s].
+            object_speed: bound on the speed of objects [m/s], also of the scenario's movers; None:
+                the scenario's.
 
         Raises:
             ValueError: no such scenario, or one that no chair can drive.
             RuntimeError: a process did not start.
         """
-        self.scenario, self.seed = load_scenario(scenario), seed
+        directory = Path(tempfile.mkdtemp(prefix="twin-"))
+        self._config = TwinConfig(
+            directory=directory, scenario=scenario, seed=seed, object_speed=object_speed
+        )
+        self.directory, self.scenario, self.seed = directory, self._config.load(), seed
         robot = self.scenario.robot
         if not isinstance(robot, DifferentialDrive):
             raise ValueError(
@@ -92,8 +104,6 @@ class Chain:
         self.cycle = door.finite("twin", "cycle", cycle, above=0.05, unit="s")
         self.robot = robot
         self.world, state, self.start_time = self.scenario.build(seed)
-        self.directory = Path(tempfile.mkdtemp(prefix="twin-"))
-        self._config = TwinConfig(directory=self.directory, scenario=str(scenario), seed=seed)
         self.settings = settings_of(self.scenario, cycle, self._config.nature())
         self._executor_settings = executor_settings(cycle)
         self._executor_settings.check_margins(

@@ -9,6 +9,7 @@ physics.
 
 from __future__ import annotations
 
+import dataclasses
 import gc
 import json
 import os
@@ -62,14 +63,15 @@ class TwinConfig:
     """A shipped name, or a file."""
     seed: int = 0
     """Of the scenario's world, of the chair, and of all noise."""
+    object_speed: float | None = None
+    """Bound on the speed of objects [m/s]; faster movers are slowed down. None: the scenario's."""
 
     def __post_init__(self) -> None:
         door.whole("TwinConfig", "seed", self.seed, least=0)
 
     def to_json(self) -> str:
         """As the process is told it."""
-        told = {"directory": str(self.directory), "scenario": self.scenario, "seed": self.seed}
-        return json.dumps(told)
+        return json.dumps(dataclasses.asdict(self) | {"directory": str(self.directory)})
 
     @classmethod
     def from_json(cls, text: str) -> TwinConfig:
@@ -83,6 +85,14 @@ class TwinConfig:
             return cls(directory=Path(given.pop("directory")), **given)
         except (KeyError, TypeError, AttributeError) as cause:
             raise ValueError(f"no configuration of a twin: {cause!r}") from cause
+
+    def load(self) -> Scenario:
+        """The scenario.
+
+        Raises:
+            ValueError: there is none of that name, or something is wrong with it.
+        """
+        return load_scenario(self.scenario).changed(object_speed=self.object_speed)
 
     def nature(self) -> ChairNature:
         """The chair that this seed draws."""
@@ -158,7 +168,7 @@ def run(config: TwinConfig) -> None:
     Raises:
         ValueError: the configuration makes no sense.
     """
-    scenario = load_scenario(config.scenario)
+    scenario = config.load()
     world, state, start_time = scenario.build(config.seed)
     parent, asked = os.getppid(), []
 
