@@ -52,9 +52,7 @@ class ChairLidar:
         self._body = chair.model.body("chair").id
         steps = np.arange(parameters.first, parameters.last + 1)
         bearings = mount[2] + (steps - parameters.front) * (2 * math.pi / parameters.steps_per_turn)
-        self._rays = np.stack(
-            [np.cos(bearings), np.sin(bearings), np.zeros(len(steps))], axis=1
-        )
+        self._rays = np.stack([np.cos(bearings), np.sin(bearings), np.zeros(len(steps))], axis=1)
         self._mount = np.array([mount[0], mount[1], LIDAR_HEIGHT - WHEEL_RADIUS])
         self._parts = np.array_split(np.arange(len(steps)), SLICES)
         middles = [0.5 * (steps[part[0]] + steps[part[-1]]) for part in self._parts]

@@ -12,13 +12,14 @@ import tempfile
 import time
 from collections.abc import Callable
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from hardware.chair_model import WALL_HALF
+from hardware.base import check_fits
+from hardware.chair_model import WALL_HALF, ChairNature
 from hardware.executor_process import ExecutorConfig, ExecutorProcess
 from hardware.link import PlannerLink
 from hardware.merge import Pairing, check_stamp_error, read_together
@@ -27,7 +28,7 @@ from hardware.scip_receiver import Pose
 from hardware.scip_settings import ScipSettings
 from hardware.status import State
 from hardware.twin_figures import Chained, Sent, latencies, shares, ticks_of
-from hardware.twin_process import BASE, TwinConfig, TwinProcess, limits_of
+from hardware.twin_process import BASE, TwinConfig, TwinProcess, put_forward
 from hardware.twin_settings import APART, executor_settings, settings_of
 from passpmp_ti import door
 from passpmp_ti.grid.static_map import StaticMap
@@ -43,6 +44,8 @@ NOWHERE: Pose = (0.0, 0.0, 0.0)
 STANDING = 0.01
 """Wheels that go no faster over ground than this are at rest, to the judge [m/s]: a chair that
 stands on tyres is never quite still."""
+PRIORITY = 1
+"""Of the planner, of SCHED_FIFO where it is granted: below the twin's and the executor's."""
 TELL = 1.0
 """From one look at the truth to the next [s]."""
 REST = 1.0
@@ -102,6 +105,8 @@ class Chain:
                 " is a wheelchair: take one with `robot: {type: differential}`"
             )
         self.cycle = door.finite("twin", "cycle", cycle, above=0.05, unit="s")
+        self._limits = ChairNature().limits
+        check_fits(self._limits, robot)
         self.robot = robot
         self.world, state, self.start_time = self.scenario.build(seed)
         self.settings = settings_of(self.scenario, cycle, self._config.nature())
@@ -134,7 +139,7 @@ class Chain:
                     base="hardware.base_link:build",
                     base_options={
                         "address": str(self.directory / BASE),
-                        **limits_of(self.scenario),
+                        **asdict(self._limits),
                     },
                     robot=self.robot,
                     settings=self._executor_settings,
@@ -155,6 +160,8 @@ class Chain:
                 for port, lidar in zip(self.twin.ports, self.scenario.lidars, strict=True)
             ]  # fmt: skip
             check_stamp_error(self.settings, [c.settings for c in self.clients], APART)
+            # its kernels have threads of their own
+            put_forward("the planner", PRIORITY)
             self._open = open_.pop_all()
         return self
 

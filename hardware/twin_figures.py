@@ -82,9 +82,7 @@ def ticks_of(log: Path) -> list[Tick]:
     return [Tick(*row) for row in ROW.iter_unpack(data[: len(data) // ROW.size * ROW.size])]
 
 
-def latencies(
-    sent: Sequence[Sent], ticks: Sequence[Tick]
-) -> tuple[np.ndarray, np.ndarray, int]:
+def latencies(sent: Sequence[Sent], ticks: Sequence[Tick]) -> tuple[np.ndarray, np.ndarray, int]:
     """From arrival to an executor that has it, and to the wheels.
 
     Args:

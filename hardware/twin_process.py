@@ -177,7 +177,7 @@ def run(config: TwinConfig) -> None:
 
     for number in (signal.SIGTERM, signal.SIGINT):
         signal.signal(number, leave)
-    _put_forward()
+    put_forward("the twin", PRIORITY)
     sys.setswitchinterval(SWITCH)
     log = os.open(config.directory / TRUTH, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o600)
     rng = np.random.default_rng([config.seed, 3])
@@ -190,9 +190,7 @@ def run(config: TwinConfig) -> None:
         late = time.monotonic() - truth.stamp
         rows.extend(ROW.pack(*truth, chair.tilt, late))
 
-    chair = MujocoChair(
-        world, config.nature(), rng=own, pose=(x, y, theta), begin=begin, log=note
-    )
+    chair = MujocoChair(world, config.nature(), rng=own, pose=(x, y, theta), begin=begin, log=note)
     server = BaseServer(chair, config.directory / BASE)
     emulators = [
         _emulated(chair, mount, generator)
@@ -217,17 +215,6 @@ def run(config: TwinConfig) -> None:
         os.close(log)
 
 
-def limits_of(scenario: Scenario) -> dict[str, float]:
-    """The chair's, as `hardware.base_link:build` is told them."""
-    limits = ChairNature().limits
-    return {
-        "wheel_speed": max(limits.wheel_speed, scenario.robot.top_speed),
-        "acceleration": limits.acceleration,
-        "track": limits.track,
-        "command_timeout": limits.command_timeout,
-    }
-
-
 def _emulated(
     chair: MujocoChair, mount: tuple[float, float, float], rng: np.random.Generator
 ) -> Emulator:
@@ -243,11 +230,13 @@ def _emulated(
     return Emulator(make)
 
 
-def _put_forward() -> None:
+def put_forward(who: str, priority: int) -> None:
+    """Give all threads of this process a priority of SCHED_FIFO, or say that none is granted."""
     try:
-        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(PRIORITY))
+        for thread in os.listdir("/proc/self/task"):
+            os.sched_setscheduler(int(thread), os.SCHED_FIFO, os.sched_param(priority))
     except (OSError, AttributeError) as cause:
-        print(f"the twin has no priority: {cause}; it may be late", file=sys.stderr)
+        print(f"{who} has no priority: {cause}; it may be late", file=sys.stderr)
 
 
 def main() -> int:
