@@ -75,6 +75,7 @@ class ChairLidar:
         hit = (ranges >= 0) & (ranges <= far)
         errors = np.clip(self._rng.normal(0.0, self._noise, count), -3 * self._noise, None)
         errors = np.minimum(errors, 3 * self._noise)
+        # nothing is nearer than 0, and 0 would be a lost beam
         return np.where(hit, np.maximum(ranges + errors, 0.0) + 1e-9, np.inf)
 
     def _cast(self, rays: np.ndarray, when: float, qpos: np.ndarray) -> np.ndarray:

@@ -115,7 +115,8 @@ def test_without_its_small_wheels_behind_it_tips_over_backwards():
         driven(chair, clock, 3.0, 3.0, 1.0)
         lean[held] = chair.tilt
     assert lean[True] < math.radians(5)
-    assert lean[False] > math.radians(45)
+    # it lies on the back of its frame
+    assert lean[False] > math.radians(30)
 
 
 def test_wheels_slip_and_are_not_as_large_as_it_believes():
@@ -250,7 +251,8 @@ def test_who_is_not_in_the_world_is_not_seen():
 def test_errors_of_ranges_stay_within_what_is_declared():
     chair, clock = standing(World(BOUNDS, segments=np.array([[3.0, -9.0, 3.0, 9.0]])))
     clean, noisy = sweep(chair, clock), sweep(chair, clock, noise=0.02)
-    off = np.abs(noisy - clean)[np.isfinite(clean)]
+    hit = np.isfinite(clean)
+    off = np.abs(noisy[hit] - clean[hit])
     assert 0.03 < off.max() <= 0.06 + 1e-6
 
 
