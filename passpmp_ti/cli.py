@@ -13,6 +13,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from hardware import drive as driving
 from passpmp_ti import door
 from passpmp_ti.bench import command
 from passpmp_ti.benchmark import command as benchmarking
@@ -430,6 +431,17 @@ def _parser() -> argparse.ArgumentParser:
             reproducing.EXAMPLE,
         )
     )
+
+    driving.add_options(
+        _command(
+            commands,
+            "drive",
+            "drive a wheelchair through the whole chain: lidars, planner, executor, wheels",
+            driving.run,
+            driving.EXAMPLE,
+        )
+    )
+
     _attack_options(
         _command(
             commands,

@@ -1,0 +1,255 @@
+"""The physics twin as a process of its own: chair, people and range finders, in real time.
+
+    python -m hardware.twin_process '{"directory": "/run/passpmp", "scenario": "corridor_person"}'
+
+It stands for the world, which is never late: it asks for a priority below the executor's. Where it
+is late all the same it catches up, and every stamp stays true: a range finder waits for the
+physics.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import gc
+import json
+import os
+import select
+import signal
+import struct
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from types import FrameType
+
+import numpy as np
+
+from hardware.base import Odometry
+from hardware.base_link import BaseServer
+from hardware.chair_lidar import ChairLidar
+from hardware.chair_model import ChairNature
+from hardware.mujoco_chair import MujocoChair
+from hardware.scip_device import Device
+from hardware.scip_emulator import Emulator
+from hardware.scip_rotor import Nature
+from passpmp_ti import door
+from passpmp_ti.sim.scenario import Scenario, load_scenario
+
+LOOK = 0.002
+"""It looks for commands, and moves on, this often [s]."""
+GREETING = 3.0
+"""People begin to walk this long after the process has started [s]: by then all is connected."""
+PRIORITY = 5
+"""Of SCHED_FIFO, where the system grants it."""
+SWITCH = 5e-4
+"""A range finder's rays hold up the chair for this long at the most [s]."""
+ROW = struct.Struct(f"<{len(Odometry._fields) + 2}d")
+"""A row of the truth: the chair's, how far it leans [rad], and how late the twin is [s]."""
+BASE, TRUTH = "base", "truth"
+"""Names of the base's socket and of the truth's file in the directory."""
+LIDAR_NOISE = 0.01
+"""Standard deviation of a range, cut at three of them [m]."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TwinConfig:
+    """All that a twin's process needs to know."""
+
+    directory: Path
+    """Of its socket and of the truth."""
+    scenario: str
+    """A shipped name, or a file."""
+    seed: int = 0
+    """Of the scenario's world, of the chair, and of all noise."""
+    object_speed: float | None = None
+    """Bound on the speed of objects [m/s]; faster movers are slowed down. None: the scenario's."""
+
+    def __post_init__(self) -> None:
+        door.whole("TwinConfig", "seed", self.seed, least=0)
+
+    def to_json(self) -> str:
+        """As the process is told it."""
+        return json.dumps(dataclasses.asdict(self) | {"directory": str(self.directory)})
+
+    @classmethod
+    def from_json(cls, text: str) -> TwinConfig:
+        """As `to_json` wrote it.
+
+        Raises:
+            ValueError: a field is missing, unknown, or out of its range.
+        """
+        try:
+            given = json.loads(text)
+            return cls(directory=Path(given.pop("directory")), **given)
+        except (KeyError, TypeError, AttributeError) as cause:
+            raise ValueError(f"no configuration of a twin: {cause!r}") from cause
+
+    def load(self) -> Scenario:
+        """The scenario.
+
+        Raises:
+            ValueError: there is none of that name, or something is wrong with it.
+        """
+        return load_scenario(self.scenario).changed(object_speed=self.object_speed)
+
+    def nature(self) -> ChairNature:
+        """The chair that this seed draws."""
+        return ChairNature.drawn(np.random.default_rng([self.seed, 2]))
+
+
+class TwinProcess:
+    """Starts a twin and looks after it."""
+
+    def __init__(self, config: TwinConfig, *, within: float = 30.0) -> None:
+        """
+        Args:
+            config: what it is told.
+            within: time to start [s].
+
+        Raises:
+            RuntimeError: it did not start; says why.
+        """
+        home = str(Path(__file__).parents[1])
+        paths = [home, *filter(None, [os.environ.get("PYTHONPATH")])]
+        self._truth = config.directory / TRUTH
+        self._read = 0
+        self.process = subprocess.Popen(
+            [sys.executable, "-m", "hardware.twin_process", config.to_json()],
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            env={
+                **os.environ,
+                "PYTHONPATH": os.pathsep.join(paths),
+                "ENABLE_TAICHI_HEADER_PRINT": "0",
+            },
+            start_new_session=True,
+        )
+        assert self.process.stdout is not None
+        ready, _, _ = select.select([self.process.stdout], [], [], within)
+        told = self.process.stdout.readline() if ready else b""
+        if not told.startswith(b"{"):
+            self.process.kill()
+            _, why = self.process.communicate()
+            raise RuntimeError(f"the twin did not start: {why.decode(errors='replace')}")
+        heard = json.loads(told)
+        self.ports: list[int] = heard["ports"]
+        """Of its range finders, in the scenario's order."""
+        self.begin: float = heard["begin"]
+        """The world's time is this much ahead of the clock's [s]."""
+
+    def truth(self) -> np.ndarray:
+        """[n, 8] what really was since the last call: stamp, x, y, theta, right and left over
+        ground, lean, lateness."""
+        with self._truth.open("rb") as file:
+            file.seek(self._read)
+            data = file.read()
+        whole = len(data) // ROW.size * ROW.size
+        self._read += whole
+        return np.frombuffer(data[:whole], dtype="<f8").reshape(-1, ROW.size // 8)
+
+    def close(self, within: float = 10.0) -> str:
+        """End it. Returns what it complained of."""
+        if self.process.poll() is None:
+            self.process.terminate()
+        try:
+            _, told = self.process.communicate(timeout=within)
+        except subprocess.TimeoutExpired:
+            self.process.kill()
+            _, told = self.process.communicate()
+        return told.decode(errors="replace")
+
+
+def run(config: TwinConfig) -> None:
+    """Be a twin, until a signal or the death of whoever started this process ends it.
+
+    Raises:
+        ValueError: the configuration makes no sense.
+    """
+    scenario = config.load()
+    world, state, start_time = scenario.build(config.seed)
+    parent, asked = os.getppid(), []
+
+    def leave(number: int, frame: FrameType | None) -> None:
+        asked.append(number)
+
+    for number in (signal.SIGTERM, signal.SIGINT):
+        signal.signal(number, leave)
+    put_forward("the twin", PRIORITY)
+    sys.setswitchinterval(SWITCH)
+    log = os.open(config.directory / TRUTH, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o600)
+    rng = np.random.default_rng([config.seed, 3])
+    own, *others = rng.spawn(1 + len(scenario.lidars))
+    x, y, theta = (float(v) for v in state[:3])
+    begin = start_time - (time.monotonic() + GREETING)
+    rows = bytearray()
+
+    def note(truth: Odometry) -> None:
+        late = time.monotonic() - truth.stamp
+        rows.extend(ROW.pack(*truth, chair.tilt, late))
+
+    chair = MujocoChair(world, config.nature(), rng=own, pose=(x, y, theta), begin=begin, log=note)
+    server = BaseServer(chair, config.directory / BASE)
+    emulators = [
+        _emulated(chair, mount, generator)
+        for mount, generator in zip((d.mount for d in scenario.lidars), others, strict=True)
+    ]
+    gc.collect()
+    gc.freeze()
+    gc.disable()
+    told = {"ports": [emulator.address[1] for emulator in emulators], "begin": begin}
+    os.write(sys.stdout.fileno(), json.dumps(told).encode() + b"\n")
+    try:
+        while not asked and os.getppid() == parent:
+            select.select([server], [], [], LOOK)
+            server.step()
+            chair.advance()
+            os.write(log, rows)
+            rows.clear()
+    finally:
+        for emulator in emulators:
+            emulator.close()
+        server.close()
+        os.close(log)
+
+
+def _emulated(
+    chair: MujocoChair, mount: tuple[float, float, float], rng: np.random.Generator
+) -> Emulator:
+    """A range finder on its port, with a clock and a mirror of its own."""
+    rate = 1.0 + float(rng.uniform(-5e-5, 5e-5))
+    start, uneven = int(rng.integers(1 << 24)), float(rng.uniform(-2e-3, 2e-3))
+    nature = Nature(clock_start=start, clock_rate=rate, unevenness=uneven)
+    source = ChairLidar(chair, mount, rng, noise=LIDAR_NOISE)
+
+    def make(now: float, source: Callable[[float], np.ndarray] = source) -> Device:
+        return Device(source, now, nature)
+
+    return Emulator(make)
+
+
+def put_forward(who: str, priority: int) -> None:
+    """Give all threads of this process a priority of SCHED_FIFO, or say that none is granted."""
+    try:
+        for thread in os.listdir("/proc/self/task"):
+            os.sched_setscheduler(int(thread), os.SCHED_FIFO, os.sched_param(priority))
+    except (OSError, AttributeError) as cause:
+        print(f"{who} has no priority: {cause}; it may be late", file=sys.stderr)
+
+
+def main() -> int:
+    if len(sys.argv) != 2:
+        print("example: python -m hardware.twin_process CONFIGURATION", file=sys.stderr)
+        return 2
+    try:
+        run(TwinConfig.from_json(sys.argv[1]))
+    except ValueError as error:
+        print(error, file=sys.stderr)
+        return 2
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
