@@ -10,17 +10,14 @@ same seed makes the same inputs. The exit code is 1 if anything failed.
 
 from __future__ import annotations
 
-import argparse
 import math
 import random
-import resource
 import shutil
 import sys
 import tempfile
-import time
-import traceback
 import zlib
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -30,7 +27,7 @@ from hardware.base_link import BaseServer, RemoteBase
 from hardware.executor import ADDRESS, BUTTON, Executor
 from hardware.executor_settings import ExecutorSettings
 from hardware.executor_trials import motion
-from hardware.fuzz import LONGEST, Findings, broken
+from hardware.fuzz import Findings, broken, carry_out
 from hardware.letterbox import Letterbox
 from hardware.link import PlannerLink
 from hardware.messages import (
@@ -193,43 +190,16 @@ def fuzz(inputs: int, draw: random.Random) -> Findings:
             data = broken(right, draw)
             if draw.random() < 0.5:
                 data = summed(data)
-            began = time.thread_time()
-            try:
-                target.eat(data)
-            except MessageError:
-                findings.refused += 1
-            except Exception:
-                findings.failures.append(f"{name}: {data!r}\n{traceback.format_exc(limit=4)}")
-            took = time.thread_time() - began
-            if took > findings.slowest:
-                findings.slowest, findings.slowest_target = took, name
-            if took > LONGEST:
-                findings.failures.append(f"{name}: {took:.1f} s for {data!r}")
+            findings.attempt(name, data, partial(target.eat, data), MessageError)
         target.close()
     return findings
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(
-        description="Throw broken messages at everything that reads them.",
-        epilog="example: python -m hardware.executor_fuzz --inputs 100000 --seed 7",
+    """Throw broken messages at the executor, its base and the planner's link."""
+    return carry_out(
+        "Throw broken messages at everything that reads them.", "hardware.executor_fuzz", fuzz
     )
-    parser.add_argument("--inputs", type=int, default=100_000)
-    parser.add_argument("--seed", type=int, default=0)
-    given = parser.parse_args()
-    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    findings = fuzz(given.inputs, random.Random(given.seed))
-    for name, number in findings.inputs.items():
-        print(f"{name:8s} {number:9,d} inputs")
-    grown = (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) / 1024
-    print(
-        f"{findings.refused:,d} refused by the codec, {len(findings.failures)} failures; the"
-        f" slowest {1000 * findings.slowest:.1f} ms of work ({findings.slowest_target});"
-        f" {grown:.0f} MB more memory at the most"
-    )
-    for failure in findings.failures[:10]:
-        print(failure)
-    return 1 if findings.failures else 0
 
 
 if __name__ == "__main__":

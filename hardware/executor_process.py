@@ -28,6 +28,7 @@ from types import FrameType
 from typing import Any
 
 from hardware.base import Base
+from hardware.child import ended
 from hardware.executor import Executor, Tick
 from hardware.executor_settings import ExecutorSettings
 from hardware.follower import FollowerSettings
@@ -174,16 +175,7 @@ class ExecutorProcess:
 
     def close(self, within: float = 20.0) -> str:
         """Let it come to rest and end. Returns what it complained of."""
-        if self.alive:
-            # one that is stopped hears nothing
-            self.process.send_signal(signal.SIGCONT)
-            self.process.terminate()
-        try:
-            _, told = self.process.communicate(timeout=within)
-        except subprocess.TimeoutExpired:
-            self.process.kill()
-            _, told = self.process.communicate()
-        return told.decode(errors="replace")
+        return ended(self.process, within)
 
 
 def run(config: ExecutorConfig) -> None:

@@ -20,6 +20,7 @@ import time
 import traceback
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 
@@ -67,6 +68,30 @@ class Findings:
     slowest: float = 0.0
     """[s]."""
     slowest_target: str = ""
+
+    def attempt(
+        self, name: str, data: bytes, eat: Callable[[], object], refusal: type[Exception]
+    ) -> None:
+        """Let a target eat an input, and note what came of it.
+
+        Args:
+            name: of the target.
+            data: the input, for the report.
+            eat: hands it over.
+            refusal: what the protocol itself may raise.
+        """
+        began = time.thread_time()
+        try:
+            eat()
+        except refusal:
+            self.refused += 1
+        except Exception:
+            self.failures.append(f"{name}: {data!r}\n{traceback.format_exc(limit=4)}")
+        took = time.thread_time() - began
+        if took > self.slowest:
+            self.slowest, self.slowest_target = took, name
+        if took > LONGEST:
+            self.failures.append(f"{name}: {took:.1f} s for {data!r}")
 
 
 def _source(_: float) -> np.ndarray:
@@ -295,27 +320,18 @@ def fuzz(inputs: int, draw: random.Random, targets: dict[str, float] = SHARES) -
             data = broken(target.right, draw)
             if target.sums and draw.random() < 0.5:
                 data = with_sums(data)
-            began = time.thread_time()
-            try:
-                target.eat(data, draw)
-            except ScipError:
-                findings.refused += 1
-            except Exception:
-                findings.failures.append(f"{name}: {data!r}\n{traceback.format_exc(limit=4)}")
-            took = time.thread_time() - began
-            if took > findings.slowest:
-                findings.slowest, findings.slowest_target = took, name
-            if took > LONGEST:
-                findings.failures.append(f"{name}: {took:.1f} s for {data!r}")
+            findings.attempt(name, data, partial(target.eat, data, draw), ScipError)
         if isinstance(target, Network):
             target.close()
     return findings
 
 
-def main() -> int:
+def carry_out(
+    description: str, module: str, fuzz: Callable[[int, random.Random], Findings]
+) -> int:
+    """The command of a fuzzer: read what is asked, throw, tell. Returns the exit code."""
     parser = argparse.ArgumentParser(
-        description="Throw broken input at everything that reads bytes from outside.",
-        epilog="example: python -m hardware.fuzz --inputs 100000 --seed 7",
+        description=description, epilog=f"example: python -m {module} --inputs 100000 --seed 7"
     )
     parser.add_argument("--inputs", type=int, default=100_000)
     parser.add_argument("--seed", type=int, default=0)
@@ -334,6 +350,13 @@ def main() -> int:
     for failure in findings.failures[:10]:
         print(failure)
     return 1 if findings.failures else 0
+
+
+def main() -> int:
+    """Throw broken input at the codec, the client and the emulator of range finders."""
+    return carry_out(
+        "Throw broken input at everything that reads bytes from outside.", "hardware.fuzz", fuzz
+    )
 
 
 if __name__ == "__main__":

@@ -30,6 +30,7 @@ from hardware.base import Odometry
 from hardware.base_link import BaseServer
 from hardware.chair_lidar import ChairLidar
 from hardware.chair_model import ChairNature
+from hardware.child import ended
 from hardware.mujoco_chair import MujocoChair
 from hardware.scip_device import Device
 from hardware.scip_emulator import Emulator
@@ -152,14 +153,7 @@ class TwinProcess:
 
     def close(self, within: float = 10.0) -> str:
         """End it. Returns what it complained of."""
-        if self.process.poll() is None:
-            self.process.terminate()
-        try:
-            _, told = self.process.communicate(timeout=within)
-        except subprocess.TimeoutExpired:
-            self.process.kill()
-            _, told = self.process.communicate()
-        return told.decode(errors="replace")
+        return ended(self.process, within)
 
 
 def run(config: TwinConfig) -> None:

@@ -3,17 +3,13 @@
 from __future__ import annotations
 
 import contextlib
-import time as clock
-import traceback
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from passpmp_ti import backend
-from passpmp_ti.bench.machine import commit, processor
 from passpmp_ti.benchmark.course import Course
-from passpmp_ti.compare.job import ONE_AT_A_TIME, Key, Result, rehearse_once
+from passpmp_ti.compare.job import Key, Result, rehearse_once, told_of
 from passpmp_ti.compare.ledger import Ledger
 from passpmp_ti.compare.workers import Workers
 from passpmp_ti.sim.contacts import Contact
@@ -26,7 +22,7 @@ class Trial:
     """One episode of a benchmark."""
 
     benchmark: str
-    """"barn" or "dynabarn"."""
+    """Its name on the command line."""
     world: int
     variant: str
     """How the robot is equipped."""
@@ -118,19 +114,7 @@ def carry_out(trial: Trial, scenario_of: Callable[[Trial], Scenario]) -> Result:
         trial: which.
         scenario_of: what it is driven in.
     """
-    with ONE_AT_A_TIME:
-        backend.init("cpu", threads=1)
-        began = clock.perf_counter()
-        name, variant, seed = trial.key
-        told: Result = {"scenario": name, "variant": variant, "seed": seed, "error": None}
-        try:
-            told |= _driven(scenario_of(trial), seed)
-        except Exception:
-            told |= {"error": traceback.format_exc(), "timings": {}}
-        told["timings"] |= {
-            "machine": processor(), "commit": commit(), "seconds": clock.perf_counter() - began
-        }  # fmt: skip
-        return told
+    return told_of(trial.key, lambda: _driven(scenario_of(trial), trial.trial))
 
 
 def _driven(scenario: Scenario, seed: int) -> dict[str, Any]:
