@@ -182,10 +182,6 @@ def _compare(given: argparse.Namespace) -> int:
     return comparing.run(given, _settings(given))
 
 
-def _reproduce(given: argparse.Namespace) -> int:
-    return reproducing.run(given)
-
-
 def _attack(given: argparse.Namespace) -> int:
     if given.replay:
         return _replay(given)
@@ -427,7 +423,7 @@ def _parser() -> argparse.ArgumentParser:
             commands,
             "reproduce",
             "run the paper's tables and figures again, and put ours beside them",
-            _reproduce,
+            reproducing.run,
             reproducing.EXAMPLE,
         )
     )

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import contextlib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -90,14 +90,7 @@ def carry_out_all(
         KeyboardInterrupt: Ctrl-C; what is finished is written.
     """
     ledger = Ledger(folder, campaign.conditions)
-    left = [trial for trial in campaign.jobs() if not ledger.done(trial.key)]
-    try:
-        with contextlib.closing(workers.each(drive, left)) as found:
-            for result in found:
-                ledger.add(result)
-                on_result(ledger.results)
-    finally:
-        ledger.close()
+    ledger.fill(campaign.jobs(), partial(workers.each, drive), on_result)
 
 
 def read_all(campaign: Campaign, folder: Path) -> list[Result]:

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import contextlib
 import hashlib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -129,15 +129,7 @@ def carry_out_all(
         KeyboardInterrupt: Ctrl-C; what is finished is written.
     """
     ledger = Ledger(folder, comparison.conditions())
-    wanted = comparison.jobs()
-    left = [job for job in wanted if not ledger.done(job.key)]
-    try:
-        with contextlib.closing(workers.each(carry_out, left)) as found:
-            for result in found:
-                ledger.add(result)
-                on_result(ledger.results)
-    finally:
-        ledger.close()
+    ledger.fill(comparison.jobs(), partial(workers.each, carry_out), on_result)
     return chosen(comparison, ledger.results)
 
 

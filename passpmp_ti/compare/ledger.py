@@ -2,15 +2,27 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
-from collections.abc import Mapping
+from collections.abc import Callable, Generator, Iterable, Mapping
 from pathlib import Path
-from typing import IO, Any
+from typing import IO, Any, Protocol, TypeVar
 
 from passpmp_ti.compare.job import Key, Result, key_of
 
 EPISODES, CONDITIONS = "episodes.jsonl", "conditions.json"
+
+
+class Keyed(Protocol):
+    """What can be done, and is told from the rest by its key."""
+
+    @property
+    def key(self) -> Key:
+        """(scenario, variant, seed)."""
+
+
+J = TypeVar("J", bound=Keyed)
 
 
 class Ledger:
@@ -56,6 +68,31 @@ class Ledger:
         self._file.flush()
         os.fsync(self._file.fileno())
         self.results[key_of(found)] = found
+
+    def fill(
+        self,
+        jobs: Iterable[J],
+        each: Callable[[list[J]], Generator[Result, None, None]],
+        on_result: Callable[[Mapping[Key, Result]], None],
+    ) -> None:
+        """Have done what is not done yet, and close the file.
+
+        Args:
+            jobs: what is wanted.
+            each: does what is left of it.
+            on_result: shown all results so far, those of earlier runs too, after each.
+
+        Raises:
+            KeyboardInterrupt: Ctrl-C; what is finished is written.
+        """
+        left = [job for job in jobs if not self.done(job.key)]
+        try:
+            with contextlib.closing(each(left)) as found:
+                for result in found:
+                    self.add(result)
+                    on_result(self.results)
+        finally:
+            self.close()
 
     def close(self) -> None:
         """Close the file."""
