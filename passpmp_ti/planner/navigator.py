@@ -67,14 +67,10 @@ class Navigator:
         seed: int | np.random.Generator = 0,
     ) -> None:
         backend.init()
-        goals = np.atleast_2d(np.asarray(goal, dtype=np.float64))
-        goals = door.array("Navigator", "goal", goals, (None, 2))
-        if not len(goals):
-            raise ValueError("Navigator.goal holds no goal; give (x, y), or a list of them")
         self.robot = robot
         self.settings = settings
         self.static_map = static_map
-        self.goals = [(float(x), float(y)) for x, y in goals]
+        self.goals = _goals_of(goal)
         self.held: Trajectory | None = None
         """The trajectory that is being executed, or will be from its start."""
         self.model: FutureModel | None = None
@@ -106,6 +102,20 @@ class Navigator:
     def reached(self) -> bool:
         """Whether the robot came to rest at the last goal."""
         return self._next_goal >= len(self.goals)
+
+    def head_for(self, goal: tuple[float, float] | Sequence[tuple[float, float]]) -> None:
+        """Drive to another goal, or to others in turn, from the next cycle on. What is held stays
+        held, and what is known stays known.
+
+        Args:
+            goal: (x, y) [m], or several.
+
+        Raises:
+            ValueError: there is none, or numbers that are none.
+        """
+        self.goals = _goals_of(goal)
+        self._next_goal = 0
+        self._guide = None
 
     def update(
         self,
@@ -413,6 +423,19 @@ class Navigator:
             leaf, cost = best_leaf(tree, self.robot, self.settings)
             return leaf, (), cost
         return self._swarm.choose(tree, self._generator)
+
+
+def _goals_of(goal: object) -> list[tuple[float, float]]:
+    """One goal, or several, as a list of (x, y) [m].
+
+    Raises:
+        ValueError: there is none, or numbers that are none.
+    """
+    goals = np.atleast_2d(np.asarray(goal, dtype=np.float64))
+    goals = door.array("Navigator", "goal", goals, (None, 2))
+    if not len(goals):
+        raise ValueError("Navigator.goal holds no goal; give (x, y), or a list of them")
+    return [(float(x), float(y)) for x, y in goals]
 
 
 def _told(error: Exception) -> str:
