@@ -12,6 +12,7 @@ import threading
 import time
 from collections import Counter
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -19,8 +20,9 @@ from hardware.base import BaseLimits, Odometry, twist_of
 from hardware.base_link import BaseServer
 from hardware.priority import put_forward
 from hardware.ros_clock import RosClock
-from hardware.ros_messages import Tree, Untrusted, motion_of, twist
-from hardware.ros_port import BOOL, ODOMETRY, TWIST, Port
+from hardware.ros_frames import Frames, compose
+from hardware.ros_messages import Pose, Tree, Untrusted, motion_of, transforms_of, twist
+from hardware.ros_port import BOOL, ODOMETRY, TRANSFORMS, TWIST, Port
 from hardware.ros_settings import RosSettings
 from hardware.stop_button import StopButton
 
@@ -47,7 +49,8 @@ class RosBase:
         say_stop: Callable[[Tree], None],
         *,
         times: RosClock,
-        frame: str,
+        child: str,
+        place: Callable[[str, Pose], Pose] = lambda frame, pose: pose,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         """
@@ -56,12 +59,14 @@ class RosBase:
             say: publishes cmd_vel, a geometry_msgs/Twist.
             say_stop: publishes whether the executor's stop is on, a latched std_msgs/Bool.
             times: for the odometry's stamps.
-            frame: the odometry's child frame; what moves another frame is not believed.
+            child: the odometry's child frame; what moves another frame is not believed.
+            place: puts a pose in the odometry's frame into the one that is planned in.
             clock: seconds that never go back.
         """
         self._limits = limits
         self._say, self._say_stop = say, say_stop
-        self._times, self._frame, self._clock = times, frame, clock
+        self._times, self._child, self._clock = times, child, clock
+        self._place = place
         self._told: Odometry | None = None
         self._told_at = -math.inf
         self._said_at = -math.inf
@@ -120,15 +125,16 @@ class RosBase:
         """Take in a nav_msgs/Odometry; what is not to be believed is as if it had not come."""
         try:
             motion = motion_of(message)
-            if motion.child.lstrip("/") != self._frame:
-                raise Untrusted(f"odometry of the frame {motion.child!r}")
+            if motion.child.lstrip("/") != self._child:
+                raise Untrusted(f"odometry of a frame that is not {self._child}")
             stamp = self._times.ours(motion.stamp)
+            pose = self._place(motion.frame, motion.pose)
         except Untrusted as why:
             self.refused[str(why)] += 1
             return
         if self._told is not None and stamp <= self._told.stamp:
             return
-        self._told = motion.odometry(stamp, self._limits.track)
+        self._told = replace(motion, pose=pose).odometry(stamp, self._limits.track)
 
     def _tell(self, right: float, left: float) -> None:
         self._said_at = self._clock()
@@ -200,13 +206,28 @@ def serve(port: Port, settings: RosSettings, leave: Callable[[], bool]) -> None:
     directory = settings.directory
     directory.mkdir(mode=0o700, parents=True, exist_ok=True)
     times = RosClock(oldest=settings.oldest, skew=settings.skew)
+    frames = Frames()
+
+    def place(frame: str, pose: Pose) -> Pose:
+        origin = frames.pose(settings.frame or frame, frame)
+        if origin is None:
+            raise Untrusted(f"tf does not join the odometry's frame with {settings.frame}")
+        return compose(origin, pose)
+
     base = RosBase(
         settings.limits, port.publisher("cmd_vel", TWIST),
-        port.publisher("stop", BOOL, latched=True), times=times, frame=settings.base_frame,
+        port.publisher("stop", BOOL, latched=True), times=times, child=settings.base_frame,
+        place=place,
     )  # fmt: skip
     server = BaseServer(base, directory / SOCKET)
     keeper = ButtonKeeper(directory, lambda pressed: base.press(pressed=pressed))
     try:
+        if settings.frame:
+            for topic in ("/tf", "/tf_static"):
+                port.subscribe(
+                    topic, TRANSFORMS, lambda heard: frames.hear(transforms_of(heard)),
+                    latched=topic == "/tf_static",
+                )  # fmt: skip
         port.subscribe("odom", ODOMETRY, base.hear)
         port.subscribe("emergency_stop", BOOL, keeper.hear, latched=True)
         put_forward("the base", PRIORITY)

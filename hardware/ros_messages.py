@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 
 from hardware.base import Odometry, twist_of, wheels_of
+from passpmp_ti.grid.static_map import StaticMap
 from passpmp_ti.scan import Scan
 from passpmp_ti.trajectory import Trajectory
 
@@ -286,6 +287,25 @@ def occupancy_grid(
         },
         "data": np.where(occupied, OCCUPIED, FREE).astype(np.int8).ravel(),
     }  # fmt: skip
+
+
+def static_map_of(message: Any) -> tuple[str, StaticMap]:
+    """(frame, map) of a nav_msgs/OccupancyGrid. Only cells that are surely occupied are taken for
+    what stays: what is unknown, or likely, may be anything.
+
+    Raises:
+        Untrusted: it is no map of the plane.
+    """
+    info = message.info
+    x, y, yaw = planar(info.origin.position, info.origin.orientation, UPRIGHT)
+    data = np.array(message.data, dtype=np.int16)
+    if not len(data) or len(data) != info.width * info.height:
+        raise Untrusted(f"a map of {info.width} times {info.height} cells with {len(data)} values")
+    occupied = data.reshape(info.height, info.width) == OCCUPIED
+    try:
+        return message.header.frame_id, StaticMap(occupied, float(info.resolution), (x, y, yaw))
+    except ValueError as why:
+        raise Untrusted(f"a map that is none: {why}") from why
 
 
 def header(stamp: float, frame: str) -> Tree:

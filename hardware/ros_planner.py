@@ -1,8 +1,8 @@
 """The planner's node, whatever the middleware: messages in, trajectories to the executor.
 
-It plans in the odometry's frame, which moves without jumps (REP 105); goals of other frames are
-brought into it in every cycle. Scans, goals and transforms come from threads of the middleware and
-wait here; everything else is one loop.
+It plans in the odometry's frame, which moves without jumps (REP 105), or in the map's; goals of
+other frames are brought into it in every cycle. Scans, goals and transforms come from threads of
+the middleware and wait here; everything else is one loop.
 """
 
 from __future__ import annotations
@@ -33,6 +33,7 @@ from hardware.ros_messages import (
     path,
     place_of,
     seconds,
+    static_map_of,
     sweep_of,
     transforms_of,
 )
@@ -49,6 +50,7 @@ from hardware.ros_port import (
 )
 from hardware.ros_settings import RosSettings
 from hardware.status import State
+from passpmp_ti.grid.static_map import StaticMap
 from passpmp_ti.planner.navigator import Navigator
 from passpmp_ti.scan import Scan
 from passpmp_ti.trajectory import Trajectory
@@ -89,7 +91,8 @@ class Planner:
         self.cycles = 0
         self._times = RosClock(oldest=settings.oldest, skew=settings.skew)
         self._frames = Frames()
-        self._frame = ""  # of the odometry, in which is planned
+        self._frame = settings.frame.lstrip("/")  # that is planned in; empty: not heard of yet
+        self._map: tuple[str, StaticMap] | None = None
         self._goal: tuple[str, float, float] | None = None
         self._news = threading.Event()
         self._waiting: list[deque[tuple[Sweep, float]]] = [
@@ -109,6 +112,8 @@ class Planner:
         port.subscribe("odom", ODOMETRY, self._hear_odometry)
         port.subscribe("/tf", TRANSFORMS, self._hear_frames)
         port.subscribe("/tf_static", TRANSFORMS, self._hear_frames, latched=True)
+        if settings.map:
+            port.subscribe(settings.map, GRID, self._hear_map, latched=True)
         port.subscribe("/move_base_simple/goal", POSE, self._hear_goal)
 
     def run(self, leave: Callable[[], bool]) -> None:
@@ -166,6 +171,11 @@ class Planner:
         elif not self._begun:
             self._count("the robot moves already")
             return None
+        if not self._begun and self.settings.map:
+            if self._map is None or self._map[0].lstrip("/") != self._frame:
+                self._count(f"no map in {self._frame} on {self.settings.map} yet")
+                return None
+            self.navigator.static_map = self._map[1]
         self._aim(state)
         answer = self.navigator.update(scans, state, following=link.following)
         self._begun = True
@@ -311,10 +321,17 @@ class Planner:
         self._news.set()
 
     def _hear_odometry(self, message: Any) -> None:
-        self._frame = message.header.frame_id.lstrip("/")
+        if not self._frame:
+            self._frame = message.header.frame_id.lstrip("/")
 
     def _hear_frames(self, message: Any) -> None:
         self._frames.hear(transforms_of(message))
+
+    def _hear_map(self, message: Any) -> None:
+        try:
+            self._map = static_map_of(message)
+        except Untrusted as why:
+            self._count(str(why))
 
     def _hear_goal(self, message: Any) -> None:
         try:

@@ -38,6 +38,13 @@ class RosSettings:
     base_frame: str = "base_link"
     """Midway between the driven wheels; the odometry's child frame."""
 
+    frame: str = ""
+    """Frame that is planned in. Empty: the odometry's own, which moves without jumps. Another, as
+    "map": tf joins it with the odometry's, and where a localisation jumps by more than the
+    executor's bound, the robot brakes."""
+    map: str = ""
+    """Topic of a map, in that frame, of what stays; it is waited for. Empty: there is none."""
+
     # what may be relied on
     range_max: float = 10.0
     """How far +inf is taken for empty space [m], and beyond which returns do not count."""
@@ -53,7 +60,8 @@ class RosSettings:
     apart: float = 0.0135
     """Stamps of several scans that are taken for one instant differ by this at the most [s]."""
     pose_error: float = 0.01
-    """Greatest error of the odometry's pose within the few seconds that a plan lasts [m]."""
+    """Greatest error of the robot's pose in the frame that is planned in [m]: with a map that of
+    the localisation, else what the odometry errs by within the seconds that a plan lasts."""
     range_error: float = 0.04
     """Greatest error of a range [m]."""
 

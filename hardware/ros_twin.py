@@ -18,19 +18,22 @@ from typing import Any, Protocol
 import numpy as np
 
 from hardware.base import Odometry
+from hardware.chair_model import WALL_HALF, ChairNature
 from hardware.priority import put_forward
 from hardware.ros_clock import RosClock
 from hardware.ros_messages import (
     Pose,
     laser_scan,
+    occupancy_grid,
     odometry_message,
     transforms,
     wheels_from,
 )
-from hardware.ros_port import DIAGNOSTICS, ODOMETRY, SCAN, TRANSFORMS, TWIST, Port
+from hardware.ros_port import DIAGNOSTICS, GRID, ODOMETRY, SCAN, TRANSFORMS, TWIST, Port
 from hardware.ros_show import ERROR, OK, diagnostics
 from hardware.simulated_base import BaseNature, SimulatedBase
 from passpmp_ti import door
+from passpmp_ti.grid.static_map import StaticMap
 from passpmp_ti.robots import DifferentialDrive
 from passpmp_ti.scan import Scan
 from passpmp_ti.sim.drive import Drive
@@ -147,6 +150,12 @@ class RosTwin:
         port.publisher("/tf_static", TRANSFORMS, latched=True)(
             transforms(mounts, self._times.theirs(time.monotonic()))
         )
+        if len(world.outline):
+            known = StaticMap.from_segments(world.outline, thickness=2 * WALL_HALF)
+            stamp = self._times.theirs(time.monotonic())
+            port.publisher("map", GRID, latched=True)(
+                occupancy_grid(known.occupied, known.origin[:2], known.resolution, stamp, ODOM)
+            )
         port.subscribe("cmd_vel", TWIST, self._hear)
         self._wanted: tuple[float, float] | None = None
 
@@ -253,7 +262,6 @@ def physical_chair(
 ) -> tuple[Chair, list[Eye], float]:
     """(chair, range finders, distance between its wheels [m]) of the physics twin."""
     from hardware.chair_lidar import ChairLidar
-    from hardware.chair_model import ChairNature
     from hardware.mujoco_chair import MujocoChair
     from hardware.scip_sweep import UST_10LX
 
