@@ -1,10 +1,12 @@
 """What ROS messages mean here, when their stamps are, and where their frames: no ROS is needed."""
 
 import math
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
+import yaml
 
 from hardware import ros_messages as ros
 from hardware.base import Odometry
@@ -353,3 +355,10 @@ def test_odometry_that_is_not_to_be_believed_is_as_if_none_had_come():
     assert first[1:] == pytest.approx((1.0, 2.0, 0.5, 0.1, 0.1))
     told(wall - 0.01)  # came out of order
     assert base.odometry() is first
+
+
+@pytest.mark.parametrize("name", ["twin", "wheelchair"])
+def test_the_shipped_configurations_make_sense(name):
+    path = Path(__file__).parents[1] / "launch" / f"{name}.yaml"
+    settings = RosSettings.from_parameters(yaml.safe_load(path.read_text()))
+    assert settings.planner_settings().deadline < settings.cycle
