@@ -46,13 +46,17 @@ heard, stops, limits = [], [], BaseLimits()
 with Ros1Port("peer") as port:
     odom = port.publisher("odom", "nav_msgs/Odometry")
     button = port.publisher("emergency_stop", "std_msgs/Bool", latched=True)
-    port.subscribe("cmd_vel", "geometry_msgs/Twist", lambda m: heard.append(ros.wheels_from(m, limits.track)))
+    def hear(message):
+        heard.append(ros.wheels_from(message, limits.track))
+
+    port.subscribe("cmd_vel", "geometry_msgs/Twist", hear)
     port.subscribe("stop", "std_msgs/Bool", lambda m: stops.append(m.data), latched=True)
     base = RemoteBase(Path(sys.argv[1]) / "base", limits)
 
     def driven(right, left):
         base.drive(right, left)
-        odom(ros.odometry_message(Odometry(0.0, 1.0, 2.0, 0.5, 0.3, 0.1), time.time(), "odom", "base_link", limits.track))
+        here = Odometry(0.0, 1.0, 2.0, 0.5, 0.3, 0.1)
+        odom(ros.odometry_message(here, time.time(), "odom", "base_link", limits.track))
         time.sleep(0.01)
         return bool(heard) and abs(heard[-1][0] - right) + abs(heard[-1][1] - left) < 1e-6
 
