@@ -10,14 +10,14 @@ import importlib.util
 import math
 import shutil
 from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from hardware.base import Odometry, wheels_of
+from hardware.base import Odometry
 from hardware.merge import Pairing
 from hardware.ros_frames import Frames, compose
 from hardware.ros_messages import (
@@ -314,6 +314,7 @@ class Recording:
         range_max: float = 10.0,
         beyond_is_free: bool = False,
         apart: float = 0.0135,
+        moments: Callable[[float, float], tuple[float, float]] = lambda stamp, _: (stamp, stamp),
     ) -> Iterator[Instant]:
         """What was seen, in order.
 
@@ -321,6 +322,7 @@ class Recording:
             range_max: as for `sweep_of`.
             beyond_is_free: as for `sweep_of`.
             apart: stamps within an instant differ by this at the most [s].
+            moments: as `RosSettings.moments`.
         """
         streams = {topic: n for n, topic in enumerate(_slashed(self.topics))}
         pairing = Pairing(len(streams), apart=apart)
@@ -331,11 +333,11 @@ class Recording:
                 continue
             try:
                 sweep = sweep_of(one.message, range_max=range_max, beyond_is_free=beyond_is_free)
-                stamp = sweep.stamp - self.begin
+                stamp, middle = moments(sweep.stamp - self.begin, sweep.lasts)
                 if not stamp > newest[stream]:
                     raise Untrusted("a scan no newer than the one before")
-                state = self.way.at(stamp)
-                if state is None:
+                state = self.way.at(middle)
+                if state is None or self.way.at(stamp) is None:
                     raise Untrusted("no pose of a scan's time")
                 x, y, theta = (float(v) for v in state[:3])
                 scan = sweep.at(compose((x, y, theta), self._mounted(sweep.frame)), stamp)
@@ -407,8 +409,8 @@ def _way(rows: np.ndarray, begin: float, track: float) -> Way:
         step = poses[after] - poses[before]
         speed = (step[:, 0] * np.cos(poses[:, 2]) + step[:, 1] * np.sin(poses[:, 2])) / lapse
         turn = step[:, 2] / lapse
-    right, left = wheels_of(speed, turn, track)
-    return Way(times, np.column_stack([poses, right, left]))
+    half = 0.5 * track * turn  # eq. 23
+    return Way(times, np.column_stack([poses, speed + half, speed - half]))
 
 
 def _types(store: Any) -> Any:

@@ -95,7 +95,7 @@ class Planner:
         self._map: tuple[str, StaticMap] | None = None
         self._goal: tuple[str, float, float] | None = None
         self._news = threading.Event()
-        self._waiting: list[deque[tuple[Sweep, float]]] = [
+        self._waiting: list[deque[tuple[Sweep, float, float]]] = [
             deque(maxlen=MOST_WAITING) for _ in settings.scans
         ]
         self._newest = [-math.inf] * len(settings.scans)
@@ -195,8 +195,7 @@ class Planner:
             found = None
             for stream, waiting in enumerate(self._waiting):
                 while waiting:
-                    sweep, stamp = waiting.popleft()
-                    scan = self._placed(link, sweep, stamp)
+                    scan = self._placed(link, *waiting.popleft())
                     pair = None if scan is None else self._pairing.add(stream, scan)
                     found = pair or found
             now = time.monotonic()
@@ -207,16 +206,19 @@ class Planner:
             link.poll()
             self._news.wait(min(until - now, max(due - now, 0.0) or PATIENCE))
 
-    def _placed(self, link: PlannerLink, sweep: Sweep, stamp: float) -> Scan | None:
-        """A scan where it was taken; None where that is not known."""
+    def _placed(
+        self, link: PlannerLink, sweep: Sweep, stamp: float, middle: float
+    ) -> Scan | None:
+        """A scan with its stamp, where its sensor was in its middle; None where that is not
+        known."""
         mount = self._frames.pose(self.settings.base_frame, sweep.frame)
         if mount is None:
             self._count(f"no upright {sweep.frame} on {self.settings.base_frame} in tf")
             return None
-        state = link.state_at(stamp)
+        state = link.state_at(middle)
         if state is None:
             link.poll(timeout=0.005)
-            state = link.state_at(stamp)
+            state = link.state_at(middle)
         if state is None:
             self._count("no odometry of a scan's time")
             return None
@@ -306,18 +308,23 @@ class Planner:
         settings = self.settings
         try:
             stamp = self._times.ours(seconds(message.header.stamp))
-            if stamp <= self._newest[stream]:
-                raise Untrusted("a scan no newer than the one before")
             sweep = sweep_of(
                 message, range_max=settings.range_max, beyond_is_free=settings.beyond_is_free
             )
             if sweep.lasts > settings.sweep:
                 raise Untrusted(f"a sweep longer than sweep = {settings.sweep:g} s")
+            stamp, middle = settings.moments(stamp, sweep.lasts)
+            now = time.monotonic()
+            if stamp > now + self._times.error:
+                raise Untrusted("a scan that came before its last beam")
+            stamp = min(stamp, now)
+            if stamp <= self._newest[stream]:
+                raise Untrusted("a scan no newer than the one before")
         except Untrusted as why:
             self._count(str(why))
             return
         self._newest[stream] = stamp
-        self._waiting[stream].append((sweep, stamp))
+        self._waiting[stream].append((sweep, stamp, middle))
         self._news.set()
 
     def _hear_odometry(self, message: Any) -> None:

@@ -18,6 +18,7 @@ from passpmp_ti import door
 from passpmp_ti.robots import DifferentialDrive
 from passpmp_ti.settings import Settings
 
+STAMPED = ("any", "first")
 HASTE = 0.02
 """What a cycle needs beside planning, from the scan's stamp to the executor [s]."""
 
@@ -51,8 +52,10 @@ class RosSettings:
     beyond_is_free: bool = False
     """Whether the driver says a number above its `range_max` for +inf."""
     sweep: float = 0.02
-    """Longest time from a sweep's first beam to its last [s]; a scan's stamp may be that of either
-    or of any between."""
+    """Longest time from a sweep's first beam to its last [s]."""
+    stamped: str = "any"
+    """Which beam's time a scan's stamp is: "first", as the message is defined, or "any" of the
+    sweep, for drivers of which that is not known; the robot's place is then less sure."""
     skew: float = 0.0
     """How far the clocks of the machines that stamp may be off this one's [s]."""
     oldest: float = 0.5
@@ -105,6 +108,7 @@ class RosSettings:
             door.finite(name, above_0, getattr(self, above_0), above=0.0)
         for least_0 in ("skew", "apart", "pose_error", "range_error", "object_speed"):
             door.finite(name, least_0, getattr(self, least_0), least=0.0)
+        door.choice(name, "stamped", self.stamped, STAMPED)
         door.finite(name, "cycle", self.cycle, above=2 * HASTE, unit="s")
         door.whole(name, "seed", self.seed, least=0)
         if self.threads is not None:
@@ -141,6 +145,20 @@ class RosSettings:
         pairs = self.apart if len(self.scans) > 1 else 0.0
         return self.sweep + self.skew + JUMP + pairs
 
+    def moments(self, stamp: float, lasts: float) -> tuple[float, float]:
+        """(a scan's stamp as the planner takes it, when to ask for the sensor's place) [s].
+
+        Args:
+            stamp: as the message has it.
+            lasts: from its first beam to its last, as the message tells; 0 where it does not.
+        """
+        if self.stamped == "any":
+            # no beam is a sweep older than that; those that are younger promise more than is taken
+            return stamp, stamp
+        # one that does not tell how long it lasts may last as long as any
+        lasts = lasts or self.sweep
+        return stamp + lasts, stamp + 0.5 * lasts
+
     def executor_settings(self) -> ExecutorSettings:
         """Whom the executor believes for how long: a cycle and a half, and some."""
         patience = 1.5 * self.cycle + 0.15
@@ -161,9 +179,9 @@ class RosSettings:
             ValueError: `settings` has less of a margin than they need.
         """
         executor = self.executor_settings()
-        # what the robot moves in a sweep, since a beam may be a sweep older or younger than the
-        # stamp, and between a scan's stamp and its odometry's, which are off by as much
-        astray = self.sweep + self.skew + JUMP
+        # what the robot moves between a beam and the time at which the sensor's place is asked for,
+        # the middle of the sweep where that is known, and what both stamps are off
+        astray = self.sweep * (0.5 if self.stamped == "first" else 1.0) + self.skew + JUMP
         shift = self.pose_error + self.robot.top_speed * astray
         margins: dict[str, Any] = {
             # what it moves away between two odometries is not seen

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from hardware import drive as driving
+from hardware import replay_command as replaying
 from passpmp_ti import door
 from passpmp_ti.bench import command
 from passpmp_ti.benchmark import command as benchmarking
@@ -180,6 +181,10 @@ def _bench(given: argparse.Namespace) -> int:
 
 def _compare(given: argparse.Namespace) -> int:
     return comparing.run(given, _settings(given))
+
+
+def _replay_bag(given: argparse.Namespace) -> int:
+    return replaying.run(given, _settings(given))
 
 
 def _attack(given: argparse.Namespace) -> int:
@@ -437,6 +442,12 @@ def _parser() -> argparse.ArgumentParser:
             driving.EXAMPLE,
         )
     )
+
+    recorded = _command(
+        commands, "replay", "plan on a recorded robot's scans", _replay_bag, replaying.EXAMPLE
+    )
+    replaying.add_options(recorded)
+    _scenario_changes(recorded)
 
     _attack_options(
         _command(

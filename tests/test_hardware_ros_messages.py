@@ -250,6 +250,24 @@ def test_margins_hold_what_clocks_sweeps_and_the_executor_may_be_off():
     assert made.localisation_error >= settings.pose_error + astray
 
 
+@pytest.mark.parametrize("stamped", ["any", "first"])
+@pytest.mark.parametrize("told", [0.0, 0.015])
+def test_no_beam_is_older_than_promised_or_farther_from_where_its_sensor_is_asked_for(
+    stamped, told
+):
+    # a sweep of 15 ms, whose message tells that or nothing; at 1 m/s
+    settings = RosSettings(sweep=0.02, stamped=stamped, robot=DifferentialDrive(wheel_speed=1.0))
+    made, lasts = settings.planner_settings(), 0.015
+    for begins in (0.0,) if stamped == "first" else (0.0, -0.5 * lasts, -lasts):
+        stamp, middle = settings.moments(0.0, told)
+        beams = np.array([begins, begins + lasts])
+        assert beams.min() >= stamp - settings.scan_age
+        moved = np.abs(beams - middle).max() * settings.robot.top_speed
+        assert settings.pose_error + moved <= made.localisation_error
+    # without the sweep's share the promise would not hold
+    assert np.abs(beams - middle).max() > JUMP
+
+
 @pytest.mark.parametrize(
     ("given", "said"),
     [
