@@ -8,6 +8,7 @@ import importlib.util
 import io
 import json
 import sys
+import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,7 +18,8 @@ if TYPE_CHECKING:
     from hardware.twin import Look
 
 EXAMPLE = """passpmp drive --twin corridor_person --cycle 0.1
-  passpmp drive --twin dead_end --seed 3 --seconds 60 --out out/dead_end.json"""
+  passpmp drive --twin dead_end --seed 3 --seconds 60 --out out/dead_end.json
+  passpmp drive --twin corridor_person --bag out/drive.bag"""
 FAILED, INTERRUPTED = 1, 130
 """Exit codes: something touched the robot while it moved, Ctrl-C."""
 ROWS = (
@@ -49,6 +51,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     )
     add("--threads", type=int, metavar="K", help="of the planner's kernels (default: all cores)")
     add("--out", metavar="FILE", help="write the summary here, as JSON")
+    add("--bag", metavar="FILE", help="record scans and odometry: a .bag of ROS 1, or an .mcap")
 
 
 def run(given: argparse.Namespace) -> int:
@@ -71,8 +74,17 @@ def run(given: argparse.Namespace) -> int:
     chain = Chain(given.twin, seed=given.seed, cycle=given.cycle, object_speed=given.object_speed)
     seconds = chain.scenario.duration if given.seconds is None else given.seconds
     door.finite("drive", "seconds", seconds, above=0.0, unit="s")
-    with chain:
-        found = chain.run(seconds, lambda look: print(line(look), file=sys.stderr))
+    with contextlib.ExitStack() as open_:
+        record = None
+        if given.bag:
+            from hardware.bags import DriveWriter
+
+            mounts = [lidar.mount for lidar in chain.scenario.lidars]
+            ahead = time.time() - time.monotonic()
+            writer = DriveWriter(given.bag, mounts, track=chain.robot.track, ahead=ahead)
+            record = open_.enter_context(writer).see
+        open_.enter_context(chain)
+        found = chain.run(seconds, lambda look: print(line(look), file=sys.stderr), record)
     told = found.summary()
     print(report(told))
     if given.out:

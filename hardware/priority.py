@@ -1,4 +1,4 @@
-"""Who comes first where a machine is busy."""
+"""A place before others on a busy machine."""
 
 from __future__ import annotations
 

@@ -135,8 +135,10 @@ class RosSettings:
         for name in ("settings", "executor"):
             if name in values:
                 values[name] = dict(_mapping(name, values[name]))
-        if "directory" in values:
+        if values.get("directory"):
             values["directory"] = Path(values["directory"])
+        else:
+            values.pop("directory", None)
         return cls(**values)
 
     @property

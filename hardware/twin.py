@@ -168,12 +168,18 @@ class Chain:
     def __exit__(self, *_: object) -> None:
         self._open.close()
 
-    def run(self, seconds: float, see: Callable[[Look], None] | None = None) -> Chained:
+    def run(
+        self,
+        seconds: float,
+        see: Callable[[Look], None] | None = None,
+        record: Callable[[tuple[Scan, ...], np.ndarray], None] | None = None,
+    ) -> Chained:
         """Drive until the goal is reached, or the time is over, or Ctrl-C.
 
         Args:
             seconds: longest [s].
             see: is shown how it goes, about once a second.
+            record: is shown the scans and the state that each cycle planned on.
         """
         pairing = Pairing(len(self.clients), apart=APART)
         sent: list[Sent] = []
@@ -195,6 +201,8 @@ class Chain:
                     if self.link.offer(answer):
                         sent.append(Sent(scans[0].stamp, arrived, time.monotonic(), answer.start))
                     self.drive.note(self.navigator.record, time.monotonic() - arrived)
+                    if record is not None:
+                        record(scans, state)
                 now = time.monotonic()
                 if now - told_at >= TELL:
                     told_at = now
