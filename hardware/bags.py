@@ -25,14 +25,17 @@ from hardware.ros_messages import (
     Tree,
     Untrusted,
     laser_scan,
+    map_message,
     motion_of,
     odometry_message,
     seconds,
+    static_map_of,
     sweep_of,
     transforms,
     transforms_of,
 )
-from hardware.ros_port import ODOMETRY, SCAN, TRANSFORMS
+from hardware.ros_port import GRID, ODOMETRY, SCAN, TRANSFORMS
+from passpmp_ti.grid.static_map import StaticMap
 from passpmp_ti.scan import Scan
 
 SUFFIXES = (".bag", ".mcap")
@@ -147,6 +150,7 @@ class DriveWriter:
         track: float,
         ahead: float,
         lasts: float = 0.0,
+        known: StaticMap | None = None,
     ) -> None:
         """
         Args:
@@ -155,7 +159,9 @@ class DriveWriter:
             track: distance between the driven wheels [m].
             ahead: the wall clock's time less that of the scans' stamps [s].
             lasts: a sweep, from its first beam to its last [s].
+            known: what the planner was told of what stays.
         """
+        self._known = known
         self._bag = BagWriter(path)
         self._ahead, self._track, self._lasts = ahead, track, lasts
         self._frames = [f"laser_{n}" for n in range(len(mounts))]
@@ -175,6 +181,9 @@ class DriveWriter:
             self._begun = True
             links = transforms(self._links, stamp)
             self._bag.write("/tf_static", TRANSFORMS, links, stamp)
+            if self._known is not None:
+                tree = map_message(self._known, stamp, ODOM)
+                self._bag.write("/map", GRID, tree, stamp)
         odometry = Odometry(scans[0].stamp, *(float(v) for v in state))
         tree = odometry_message(odometry, stamp, ODOM, "base_link", self._track)
         self._bag.write("/odom", ODOMETRY, tree, stamp)
@@ -301,6 +310,8 @@ class Recording:
         self.way = _way(np.array(way), self.begin, track)
         if not self.topics:
             self.topics = tuple(sorted(topics))
+        self.frame = motions[-1].frame.lstrip("/") if motions else ""
+        """That its poses are in; empty where it is not told."""
         missing = sorted(set(_slashed(self.topics)) - set(_slashed(topics)))
         if missing or not self.topics:
             raise ValueError(
@@ -352,6 +363,25 @@ class Recording:
                 yield Instant(pair[0].stamp, pair, state)
         if pairing.alone:
             self.trouble["scans without a partner"] += pairing.alone
+
+    def static_map(self, topic: str) -> StaticMap:
+        """The last map on a topic.
+
+        Raises:
+            ValueError: there is none, or it is in another frame than the poses.
+        """
+        found = None
+        for one in messages(self.path, [GRID]):
+            if _slash(one.topic) == _slash(topic):
+                found = static_map_of(one.message)
+        if found is None:
+            raise ValueError(f"{self.path}: no map on {topic}; give the topic of one, or a file")
+        if self.frame and found[0].lstrip("/") != self.frame:
+            raise ValueError(
+                f"{self.path}: the map on {topic} is in {found[0]}, the poses in {self.frame};"
+                " give a file with a map in the frame of the poses"
+            )
+        return found[1]
 
     def _read(self, odometry: str) -> tuple[set[str], list[Any], list[tuple[float, str, Pose]]]:
         """Topics of scans; motions; (time, child, pose) of what tf moves."""

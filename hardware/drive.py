@@ -81,7 +81,10 @@ def run(given: argparse.Namespace) -> int:
 
             mounts = [lidar.mount for lidar in chain.scenario.lidars]
             ahead = time.time() - time.monotonic()
-            writer = DriveWriter(given.bag, mounts, track=chain.robot.track, ahead=ahead)
+            writer = DriveWriter(
+                given.bag, mounts, track=chain.robot.track, ahead=ahead,
+                known=chain.navigator.static_map,
+            )  # fmt: skip
             record = open_.enter_context(writer).see
         open_.enter_context(chain)
         found = chain.run(seconds, lambda look: print(line(look), file=sys.stderr), record)

@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from hardware.bags import Instant, Way
+from passpmp_ti.grid.static_map import StaticMap
 from passpmp_ti.planner.navigator import Navigator
 from passpmp_ti.planner.record import CycleRecord
 from passpmp_ti.robots import DifferentialDrive
@@ -102,6 +103,7 @@ def replay(
     settings: Settings,
     *,
     goal: tuple[float, float] | None = None,
+    static_map: StaticMap | None = None,
     seconds: float = math.inf,
     seed: int = 0,
     see: Callable[[Cycle], None] | None = None,
@@ -114,6 +116,7 @@ def replay(
         robot: as it is planned for; no slower than it was.
         settings: of the planner.
         goal: (x, y) [m]; None: where the recorded robot was a while later.
+        static_map: what stays, in the frame of the poses.
         seconds: of the recording, at most.
         seed: of everything random.
         see: is shown each cycle.
@@ -127,7 +130,9 @@ def replay(
             f" robot.wheel_speed = {robot.wheel_speed:g} m/s: it could not have followed; raise"
             " that, or leave it out"
         )
-    navigator = Navigator(robot, settings, goal=goal or (0.0, 0.0), seed=seed)
+    navigator = Navigator(
+        robot, settings, goal=goal or (0.0, 0.0), static_map=static_map, seed=seed
+    )
     found = Replayed()
     bounds = _bounds(way, seconds)
     due = aimed = -math.inf

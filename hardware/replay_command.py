@@ -17,9 +17,11 @@ if TYPE_CHECKING:
     from hardware.bags import Recording
     from hardware.replay import Cycle
     from hardware.ros_settings import RosSettings
+    from passpmp_ti.grid.static_map import StaticMap
 
 EXAMPLE = """passpmp replay drive.bag --config launch/wheelchair.yaml --out out/replay
-  passpmp replay drive.mcap --object-speed 0.5 --cycle 0.2 --set blind_speed=0"""
+  passpmp replay drive.mcap --map /map --object-speed 0.5 --cycle 0.2
+  passpmp replay drive.bag --scan /front --set blind_speed=0 --set clear_radius=0.8"""
 INTERRUPTED = 130
 """Exit code: Ctrl-C."""
 EVERY = 5.0
@@ -58,6 +60,12 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         nargs=3,
         metavar=("X", "Y", "DEG"),
         help="of the range finders on the robot (default: as tf says)",
+    )
+    add(
+        "--map",
+        metavar="MAP",
+        help="of what stays, in the frame of the poses: a topic, or a map_server's YAML file"
+        " (default: none, and every wall may walk)",
     )
     add(
         "--goal",
@@ -162,8 +170,9 @@ def _replay(given: argparse.Namespace, settings: RosSettings, recording: Recordi
                 watcher(cycle)
 
         found = replay(
-            instants, recording.way, settings.robot, planner, seconds=given.seconds,
-            goal=tuple(given.goal) if given.goal else None, seed=given.seed, see=see,
+            instants, recording.way, settings.robot, planner,
+            goal=tuple(given.goal) if given.goal else None,
+            static_map=_map(given.map, recording), seconds=given.seconds, seed=given.seed, see=see,
         )  # fmt: skip
     if not found.records:
         raise ValueError(
@@ -181,6 +190,16 @@ def _replay(given: argparse.Namespace, settings: RosSettings, recording: Recordi
         path.write_text(json.dumps(told, indent=2) + "\n")
         print(f"\nwritten to {given.out}")
     return INTERRUPTED if found.interrupted else 0
+
+
+def _map(given: str | None, recording: Recording) -> StaticMap | None:
+    if not given:
+        return None
+    if Path(given).suffix in (".yaml", ".yml"):
+        from passpmp_ti.grid.static_map import StaticMap
+
+        return StaticMap.load(given)
+    return recording.static_map(given)
 
 
 class Progress:

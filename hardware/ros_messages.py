@@ -289,6 +289,13 @@ def occupancy_grid(
     }  # fmt: skip
 
 
+def map_message(known: StaticMap, stamp: float, frame: str) -> Tree:
+    """What stays as nav_msgs/OccupancyGrid; `stamp` is wall clock [s]."""
+    tree = occupancy_grid(known.occupied, known.origin[:2], known.resolution, stamp, frame)
+    tree["info"]["origin"] = pose_tree(known.origin)
+    return tree
+
+
 def static_map_of(message: Any) -> tuple[str, StaticMap]:
     """(frame, map) of a nav_msgs/OccupancyGrid. Only cells that are surely occupied are taken for
     what stays: what is unknown, or likely, may be anything.

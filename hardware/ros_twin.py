@@ -24,7 +24,7 @@ from hardware.ros_clock import RosClock
 from hardware.ros_messages import (
     Pose,
     laser_scan,
-    occupancy_grid,
+    map_message,
     odometry_message,
     transforms,
     wheels_from,
@@ -153,9 +153,7 @@ class RosTwin:
         if len(world.outline):
             known = StaticMap.from_segments(world.outline, thickness=2 * WALL_HALF)
             stamp = self._times.theirs(time.monotonic())
-            port.publisher("map", GRID, latched=True)(
-                occupancy_grid(known.occupied, known.origin[:2], known.resolution, stamp, ODOM)
-            )
+            port.publisher("map", GRID, latched=True)(map_message(known, stamp, ODOM))
         port.subscribe("cmd_vel", TWIST, self._hear)
         self._wanted: tuple[float, float] | None = None
 
