@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 
 from hardware.ros1 import Ros1Port
-from passpmp_ti import backend, door
+from passpmp_ti import backend
 
 
 def main() -> int:
@@ -14,11 +14,8 @@ def main() -> int:
             backend.init("cpu", threads=1)
             from hardware.ros_twin import RosTwin, RosTwinSettings
 
-            given = port.parameters()
-            known = list(RosTwinSettings.__dataclass_fields__)
-            for name in given:
-                door.choice("RosTwinSettings", "field", name, known)
-            RosTwin(port, RosTwinSettings(**given)).run(port.leaving)
+            settings = RosTwinSettings.from_parameters(port.parameters())
+            RosTwin(port, settings).run(port.leaving)
     except ValueError as error:
         print(f"passpmp_twin: {error}", file=sys.stderr)
         return 2

@@ -10,8 +10,8 @@ import importlib.util
 import json
 import math
 import time
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -76,6 +76,17 @@ class RosTwinSettings:
         door.choice("RosTwinSettings", "chair", self.chair, KINDS)
         door.whole("RosTwinSettings", "seed", self.seed, least=0)
         door.finite("RosTwinSettings", "greeting", self.greeting, least=0.0, unit="s")
+
+    @classmethod
+    def from_parameters(cls, given: Mapping[str, Any]) -> RosTwinSettings:
+        """From plain values.
+
+        Raises:
+            ValueError: an unknown name (the nearest is suggested), or a value out of its range.
+        """
+        for name in given:
+            door.choice("RosTwinSettings", "field", name, [f.name for f in fields(cls)])
+        return cls(**given)
 
     @property
     def physical(self) -> bool:
