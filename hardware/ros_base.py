@@ -35,6 +35,8 @@ AGAIN = 0.2
 """After this an executor is asked again that did not obey [s]."""
 PRIORITY = 8
 """Of SCHED_FIFO, where it is granted: just below the executor's."""
+LINGER = 10.0
+"""It ends when nobody drives it any more, or after this [s]."""
 SOCKET = "base"
 """Name of its socket in the executor's directory."""
 
@@ -91,6 +93,11 @@ class RosBase:
         right, left = (max(-most, min(most, v)) for v in (right, left))
         self._tell(right, left)
 
+    @property
+    def driven(self) -> bool:
+        """Whether somebody drives it now."""
+        return self._clock() - self._told_at <= self._limits.command_timeout
+
     def odometry(self) -> Odometry | None:
         return self._told
 
@@ -117,8 +124,7 @@ class RosBase:
     def watch(self) -> None:
         """Tell the robot to rest whenever nobody may drive it; to be called often."""
         now = self._clock()
-        silent = now - self._told_at > self._limits.command_timeout
-        if (silent or self._stopped or self._pressed) and now - self._said_at >= REPEAT:
+        if (not self.driven or self._stopped or self._pressed) and now - self._said_at >= REPEAT:
             self._tell(0.0, 0.0)
 
     def hear(self, message: Any) -> None:
@@ -231,7 +237,11 @@ def serve(port: Port, settings: RosSettings, leave: Callable[[], bool]) -> None:
         port.subscribe("odom", ODOMETRY, base.hear)
         port.subscribe("emergency_stop", BOOL, keeper.hear, latched=True)
         put_forward("the base", PRIORITY)
-        while not leave():
+        until = None
+        while until is None or (base.driven and time.monotonic() < until):
+            if until is None and leave():
+                # whoever ends all at once leaves the executor time to come to rest
+                until = time.monotonic() + LINGER
             select.select([server], [], [], LOOK)
             server.step()
             base.watch()

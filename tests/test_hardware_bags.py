@@ -119,6 +119,12 @@ def test_nothing_is_known_of_where_the_robot_was_in_a_gap(tmp_path):
     assert way.at(0.05)[0] == pytest.approx(0.025, abs=1e-6)
 
 
+@pytest.mark.parametrize("suffix", [".bag", ".mcap"])
+def test_a_recording_of_nothing_is_one_all_the_same(tmp_path, suffix):
+    BagWriter(tmp_path / f"none{suffix}").close()
+    assert list(messages(tmp_path / f"none{suffix}", ["sensor_msgs/LaserScan"])) == []
+
+
 def test_bad_recordings_are_refused_by_name(tmp_path):
     with pytest.raises(ValueError, match=r"\.bag or \.mcap"):
         BagWriter(tmp_path / "drive.db3")

@@ -112,7 +112,7 @@ def peer(code, *arguments, env=()):
     )  # fmt: skip
 
 
-def until(condition, within=10.0):
+def until(condition, within=30.0):
     end = time.monotonic() + within
     while not condition() and time.monotonic() < end:
         time.sleep(0.005)
@@ -143,6 +143,7 @@ def test_a_scan_goes_to_another_process_and_a_command_comes_back():
     assert json.loads(out.splitlines()[-1]) == [["1.0", "inf", "nan", "0.001"]]
 
 
+@pytest.mark.campaign
 def test_the_base_is_driven_over_the_wire_and_an_emergency_stop_holds_it(tmp_path):
     config = tmp_path / "base.yaml"
     config.write_text(json.dumps({"directory": str(tmp_path / "sockets")}))

@@ -1,6 +1,7 @@
 """What ROS messages mean here, when their stamps are, and where their frames: no ROS is needed."""
 
 import math
+import time
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -10,14 +11,19 @@ import yaml
 
 from hardware import ros_messages as ros
 from hardware.base import Odometry
-from hardware.ros_base import REPEAT, RosBase
+from hardware.executor import LATCH
+from hardware.executor_process import ExecutorConfig, ExecutorProcess
+from hardware.ros_base import REPEAT, ButtonKeeper, RosBase
 from hardware.ros_clock import JUMP, RosClock
 from hardware.ros_frames import Frames, compose, inverse
 from hardware.ros_messages import TOO_NEAR, Untrusted
 from hardware.ros_settings import RosSettings
-from hardware.ros_show import MOST_STATES, Area, thinned
+from hardware.ros_show import MOST_STATES, Area, hidden_area, markers, thinned, unsafe_area
+from passpmp_ti.grid.model import FutureModel
+from passpmp_ti.planner.record import CycleRecord
 from passpmp_ti.robots import DifferentialDrive
 from passpmp_ti.scan import Scan
+from passpmp_ti.settings import Settings
 from passpmp_ti.trajectory import Trajectory
 
 
@@ -380,3 +386,58 @@ def test_the_shipped_configurations_make_sense(name):
     path = Path(__file__).parents[1] / "launch" / f"{name}.yaml"
     settings = RosSettings.from_parameters(yaml.safe_load(path.read_text()))
     assert settings.planner_settings().deadline < settings.cycle
+
+
+# the emergency stop ----------------------------------------------------------------------------
+
+
+def held_until(condition, within=30.0):
+    end = time.monotonic() + within
+    while not condition() and time.monotonic() < end:
+        time.sleep(0.01)
+    return condition()
+
+
+def test_the_emergency_stop_s_topic_stops_an_executor_whenever_that_comes(tmp_path):
+    pressed = []
+    keeper = ButtonKeeper(tmp_path, pressed.append)
+    latch = tmp_path / LATCH
+    keeper.hear(SimpleNamespace(data=False))  # lay about before: nobody here has stopped
+    keeper.hear(SimpleNamespace(data=True))
+    assert pressed == [True]
+    config = ExecutorConfig(directory=tmp_path, base="hardware.simulated_base:build", priority=0)
+    try:
+        # the executor comes later, and is told all the same
+        with ExecutorProcess(config):
+            assert held_until(latch.exists)
+            keeper.hear(SimpleNamespace(data=False))
+            assert held_until(lambda: not latch.exists())
+            assert held_until(lambda: pressed == [True, False])
+            keeper.hear(SimpleNamespace(data=True))
+            assert held_until(latch.exists)
+    finally:
+        keeper.close()
+
+
+# what is shown ---------------------------------------------------------------------------------
+
+
+def test_a_coarse_cell_is_shown_hidden_if_any_part_of_it_is():
+    robot = DifferentialDrive(wheel_speed=1.0)
+    settings = Settings.for_robot(robot, object_speed=0.5)
+    ranges = np.full(90, 2.0)
+    ranges[:20] = 1.0
+    scan = Scan(ranges, -math.pi, math.tau / 90, 3.0, pose=(0.3, 0.1, 0.2), stamp=0.0)
+    model = FutureModel.from_scan(scan, robot, settings)
+    shown = hidden_area(model, 0.1)
+    assert shown.cell >= 0.1
+    j, i = np.nonzero(~model.seen & ~(model.ticks > 0))
+    coarse = round(shown.cell / model.cell)
+    assert shown.cells[j // coarse, i // coarse].all()
+    assert not shown.cells.all()
+    state = np.array([0.3, 0.1, 0.2, 0.5, 0.5])
+    unsafe = unsafe_area(model, state, 0.1, 2.0, 0.1)
+    assert 0 < unsafe.cells.mean() < 1
+    record = CycleRecord(stamp=0.0, decision="held", chosen=Trajectory.resting(state, 0.1))
+    told = markers(record, robot, shown, unsafe, 1.0, "odom")["markers"]
+    assert {m["ns"] for m in told} == {"hidden", "icsb", "broken", "goal", "plan", "rest"}
