@@ -64,13 +64,13 @@ with Ros1Port("peer") as port:
     told["odometry"] = base.odometry() and list(base.odometry()[1:])
     told["age"] = base.odometry() and time.monotonic() - base.odometry().stamp
     told["rests alone"] = until(lambda: heard[-1] == (0.0, 0.0))
-    told["stop said"] = until(lambda: stops == [False])
+    told["stop said"] = until(lambda: stops[:1] == [False])
     button({"data": True})
     told["pressed"] = until(lambda: not driven(0.5, 0.3) and heard[-1] == (0.0, 0.0))
     time.sleep(0.1)
     told["stays pressed"] = not driven(0.5, 0.3)
     base.stop()
-    told["stop said again"] = until(lambda: stops == [False, True])
+    told["stop said again"] = until(lambda: stops[-1:] == [True])
     base.close()
 print(json.dumps(told))
 """
@@ -147,7 +147,7 @@ def loopback(tmp_path):
 
 
 def test_messages_are_filled_as_ros_1_has_them():
-    grid = ros.occupancy_grid(np.array([[True, False]]), (1.0), 0.5, 1e9 + 0.5, "map")
+    grid = ros.occupancy_grid(np.array([[True, False]]), (1.0, 2.0), 0.5, 1e9 + 0.5, "map")
     message = ros1.filled(ros1.message_class("nav_msgs/OccupancyGrid")(), grid)
     assert message.data == [100, 0]
     assert (message.header.stamp.secs, message.header.stamp.nsecs) == (10**9, 500_000_000)
