@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import importlib.util
 import os
+import sys
 import threading
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, get_type_hints
@@ -135,8 +136,12 @@ class DdsPort:
                 readers = list(self._readers)
             for reader, hear in readers:
                 for sample in reader.take(N=AT_ONCE):
-                    if not isinstance(sample, InvalidSample):
+                    if isinstance(sample, InvalidSample):
+                        continue
+                    try:
                         hear(sample)
+                    except Exception as error:  # one message must not make the node deaf
+                        print(f"a message was not understood: {error!r}", file=sys.stderr)
 
 
 def filled(message: Any, tree: Tree) -> Any:

@@ -77,7 +77,7 @@ def run(given: argparse.Namespace) -> int:
     with contextlib.ExitStack() as open_:
         record = None
         if given.bag:
-            from hardware.bags import DriveWriter
+            from hardware.bags_drive import DriveWriter
 
             mounts = [lidar.mount for lidar in chain.scenario.lidars]
             ahead = time.time() - time.monotonic()

@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from hardware.bags import Instant, Way
+from hardware.bags_recording import Instant, Way
 from passpmp_ti.grid.static_map import StaticMap
 from passpmp_ti.planner.navigator import Navigator
 from passpmp_ti.planner.record import CycleRecord

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from hardware.bags import Recording
+    from hardware.bags_recording import Recording
     from hardware.replay import Cycle
     from hardware.ros_settings import RosSettings
     from passpmp_ti.grid.static_map import StaticMap
@@ -90,7 +90,8 @@ def run(given: argparse.Namespace, changes: Mapping[str, Any]) -> int:
     Raises:
         ValueError: a bad option, or a recording that cannot be read.
     """
-    from hardware.bags import Recording, check_installed
+    from hardware.bags import check_installed
+    from hardware.bags_recording import Recording
     from hardware.ros_settings import RosSettings
 
     check_installed()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import os
 import signal
 import sys
 from collections.abc import Callable
@@ -80,7 +81,10 @@ def filled(message: Any, tree: Tree) -> Any:
 
 
 class Ros1Port:
-    """A node of ROS 1. Signals are the node's own: rospy would end it in the middle of a cycle."""
+    """A node of ROS 1, on this machine alone unless ROS_IP or ROS_HOSTNAME says where else it is.
+
+    Signals are the node's own: rospy would end it in the middle of a cycle.
+    """
 
     def __init__(self, name: str) -> None:
         """
@@ -90,6 +94,9 @@ class Ros1Port:
         Raises:
             ValueError: ROS 1 is not installed.
         """
+        if not {"ROS_IP", "ROS_HOSTNAME"} & set(os.environ):
+            # else its sockets would listen on every interface
+            os.environ["ROS_IP"] = "127.0.0.1"
         self._rospy = load("rospy")
         self._asked: list[int] = []
         for number in (signal.SIGTERM, signal.SIGINT):

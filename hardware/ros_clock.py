@@ -61,6 +61,7 @@ class RosClock:
         ahead = self._read()
         if abs(ahead - self._ahead) > JUMP:
             self.jumps += 1
+            # first: another thread must not put a stamp by the new reading and believe it
             self._since = self._clock() + self.oldest
         self._ahead = ahead
 

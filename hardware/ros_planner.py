@@ -230,7 +230,7 @@ class Planner:
             return None
 
     def _aim(self, state: np.ndarray) -> None:
-        """Drive to the goal, told in the odometry's frame as it lies there now; without one, to
+        """Drive to the goal, where it lies now in the frame that is planned in; without one, to
         where the robot stands first."""
         if self._goal is None:
             if not self._begun:
@@ -267,9 +267,10 @@ class Planner:
     def _tell(self, link: PlannerLink) -> None:
         """Diagnostics."""
         record, status = self.navigator.record, link.status
+        unseen = dict(self.unseen)  # at once: other threads count on
         waiting_for = ""
         if not self._begun:
-            waiting_for = "; ".join(self.unseen) or "no scan came yet"
+            waiting_for = "; ".join(unseen) or "no scan came yet"
         elif self._goal is None:
             waiting_for = "no goal yet"
         level, message = ros_show.health(status, waiting_for)
@@ -289,7 +290,7 @@ class Planner:
                 "off its path, worst [mm]": 1e3 * status.worst_error,
                 "trajectories taken": status.taken, "refused": status.refused,
             }  # fmt: skip
-        values |= {f"unseen: {why}": count for why, count in self.unseen.items()}
+        values |= {f"unseen: {why}": count for why, count in unseen.items()}
         self._diagnostics(
             ros_show.diagnostics("passpmp planner", level, message, values, self._wall())
         )

@@ -9,7 +9,9 @@ import pytest
 
 pytest.importorskip("rosbags", reason="rosbags is not installed: pip install 'passpmp_ti[bags]'")
 
-from hardware.bags import BagWriter, DriveWriter, Recording, messages
+from hardware.bags import BagWriter, messages
+from hardware.bags_drive import DriveWriter
+from hardware.bags_recording import Recording
 from hardware.base import Odometry
 from hardware.ros_messages import TOO_NEAR, laser_scan, odometry_message, transforms
 from passpmp_ti.scan import Scan

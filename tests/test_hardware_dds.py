@@ -78,7 +78,7 @@ def test_bytes_are_those_that_others_make_of_the_same_message(kind):
     pytest.importorskip("rosbags", reason="rosbags is not installed: pip install rosbags")
     from rosbags.typesys import Stores, get_typestore
 
-    from hardware.bags import _made
+    from hardware.bags import made
 
     types, full = get_typestore(Stores.ROS2_HUMBLE), kind.replace("/", "/msg/")
     tree = trees()[kind]
@@ -86,7 +86,7 @@ def test_bytes_are_those_that_others_make_of_the_same_message(kind):
     back = types.deserialize_cdr(ours, full)
     # what is not in the tree is each library's own default
     whole = _tree_of(filled(dds_types.KINDS[kind](), tree))
-    theirs = bytes(types.serialize_cdr(_made(types, full, whole), full))
+    theirs = bytes(types.serialize_cdr(made(types, full, whole), full))
     assert ours[4:] == theirs[4:]
     assert type(back).__name__.endswith(kind.rpartition("/")[2])
 

@@ -12,7 +12,9 @@ import pytest
 
 pytest.importorskip("rosbags", reason="rosbags is not installed: pip install 'passpmp_ti[bags]'")
 
-from hardware.bags import BagWriter, DriveWriter, Recording
+from hardware.bags import BagWriter
+from hardware.bags_drive import DriveWriter
+from hardware.bags_recording import Recording
 from hardware.base import Odometry
 from hardware.replay import recorded_motion, replay
 from hardware.ros_messages import laser_scan, odometry_message

@@ -2,6 +2,7 @@
 
 import math
 import time
+from collections import Counter
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -169,6 +170,42 @@ def test_the_rim_of_an_area_is_what_borders_on_others():
     rim = Area(cells, (10.0, 20.0), 0.5).rim()
     assert len(rim) == 8
     assert [11.25, 21.25] not in rim.tolist()
+
+
+def test_messages_of_any_numbers_are_read_or_not_believed():
+    rng = np.random.default_rng(5)
+    odd = [math.nan, math.inf, -math.inf, 0.0, -0.0, 1e308, -1e308, 1e-308, -1.0, 3.0e38]
+
+    def shaken(tree):
+        if isinstance(tree, dict):
+            return {k: v if k == "stamp" else shaken(v) for k, v in tree.items()}
+        if isinstance(tree, list):
+            return [shaken(one) for one in tree]
+        if isinstance(tree, (float, int)) and rng.random() < 0.2:
+            return odd[rng.integers(len(odd))]
+        return tree
+
+    scan = vars(scan_message([1.0, 2.0, 3.0])) | {"header": ros.header(100.0, "laser")}
+    here = Odometry(0.0, 1.0, 2.0, 0.5, 0.1, 0.1)
+    odometry = ros.odometry_message(here, 1.0, "odom", "base", 0.5)
+    goal = ros.pose_stamped((1.0, 2.0, 0.5), 1.0, "map")
+    grid = ros.occupancy_grid(np.eye(2, dtype=bool), (1.0, 2.0), 0.5, 0.0, "map")
+    links = ros.transforms([("a", "b", (1.0, 2.0, 0.5))], 1.0)
+    read = Counter()
+    for _ in range(400):
+        for tree, reading in (
+            (scan, lambda m: ros.sweep_of(m, range_max=10.0).at((0, 0, 0), 0.0)),
+            (odometry, ros.motion_of), (goal, ros.place_of), (grid, ros.static_map_of),
+            (links, lambda m: Frames().hear(ros.transforms_of(m))),
+        ):  # fmt: skip
+            try:
+                found = reading(message(shaken(tree)))
+            except ValueError:  # Untrusted, and what a Scan refuses
+                continue
+            read[type(found).__name__] += 1
+            if isinstance(found, Scan):
+                assert not (found.ranges[found.returned] <= 0).any()
+    assert min(read.values()) > 20
 
 
 # stamps --------------------------------------------------------------------------------------
