@@ -142,18 +142,26 @@ class Planner:
             while not leave():
                 if not executor.alive:
                     raise RuntimeError(f"the executor ended: {executor.close()}")
-                chosen = self._cycle(link, due)
+                chosen = self.cycle(link, due)
                 due = max(due + settings.cycle, time.monotonic() - settings.cycle)
                 now = time.monotonic()
                 if chosen is not None and now - shown_at >= settings.show_every:
                     shown_at = now
-                    self._show()
+                    self.show()
                 if now - told_at >= TELL:
                     told_at = now
-                    self._tell(link)
+                    self.tell(link)
 
-    def _cycle(self, link: PlannerLink, due: float) -> Trajectory | None:
-        """Plan once; None where there was nothing to plan from."""
+    def cycle(self, link: PlannerLink, due: float) -> Trajectory | None:
+        """Plan once, and send it.
+
+        Args:
+            link: to the executor.
+            due: scans that came before this are passed over, by the monotonic clock [s].
+
+        Returns:
+            What was planned; None where there was nothing to plan from.
+        """
         scans = self._scans(link, due)
         arrived = time.monotonic()
         link.poll(timeout=0.02)
@@ -245,7 +253,7 @@ class Planner:
         if math.dist(goal, self.navigator.goal) > MOVED_GOAL:
             self.navigator.head_for(goal)
 
-    def _show(self) -> None:
+    def show(self) -> None:
         """Hidden region, ICS^b region, markers."""
         record, settings = self.navigator.record, self.settings
         model, chosen = record.model, record.chosen
@@ -264,7 +272,7 @@ class Planner:
         self._hidden(hidden.grid(stamp, frame))
         self._markers(ros_show.markers(record, settings.robot, hidden, unsafe, stamp, frame))
 
-    def _tell(self, link: PlannerLink) -> None:
+    def tell(self, link: PlannerLink) -> None:
         """Diagnostics."""
         record, status = self.navigator.record, link.status
         unseen = dict(self.unseen)  # at once: other threads count on

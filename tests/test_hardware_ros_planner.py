@@ -1,0 +1,173 @@
+"""The planner's node without its middleware: messages in by hand, trees out."""
+
+import math
+import time
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from hardware import ros_messages as ros
+from hardware.base import Odometry
+from hardware.ros_planner import MOST_REASONS, Planner
+from hardware.ros_settings import RosSettings
+from hardware.status import Reason, State
+from passpmp_ti.planner.navigator import Navigator
+from passpmp_ti.robots import DifferentialDrive
+from passpmp_ti.scan import Scan
+from passpmp_ti.settings import Settings
+
+ROOM = Scan(np.full(180, 5.0), -math.pi, math.tau / 180, 8.0, pose=(0, 0, 0), stamp=0.0)
+SMALL = {"particles": 20, "iterations": 10, "capacity": 300, "deadline": None}
+
+
+class Port:
+    """Keeps what is published, and has messages heard."""
+
+    def __init__(self):
+        self.said, self.hears = {}, {}
+
+    def publisher(self, topic, kind, *, latched=False):
+        said = self.said[topic] = []
+        return said.append
+
+    def subscribe(self, topic, kind, hear, *, latched=False):
+        self.hears[topic] = hear
+
+    def tell(self, topic, tree):
+        self.hears[topic](message(tree))
+
+
+class Link:
+    """An executor that rests at a place."""
+
+    def __init__(self, state):
+        self.state, self.ready, self.following = np.array(state), True, None
+        self.offered, self.beats = [], []
+        self.status = SimpleNamespace(
+            state=State.RESTING, reason=Reason.NONE, worst_error=0.0, taken=0, refused=0
+        )
+
+    def poll(self, timeout=0.0):
+        return None
+
+    def state_at(self, when):
+        return self.state.copy()
+
+    def beat(self, stamp):
+        self.beats.append(stamp)
+
+    def offer(self, trajectory):
+        self.offered.append(trajectory)
+        return True
+
+
+def message(tree):
+    if isinstance(tree, dict):
+        return SimpleNamespace(**{name: message(value) for name, value in tree.items()})
+    return [message(part) for part in tree] if isinstance(tree, list) else tree
+
+
+@pytest.fixture
+def node():
+    port = Port()
+    settings = RosSettings(
+        robot=DifferentialDrive(wheel_speed=1.0), object_speed=0.5, settings=SMALL, oldest=10.0
+    )
+    planner = Planner(port, settings)
+    time.sleep(0.05)  # stamps of before it began to look are not believed
+    port.tell(
+        "odom", ros.odometry_message(Odometry(0, 1, 2, 0, 0, 0), 0.0, "odom", "base_link", 0.54)
+    )
+    return planner, port, Link([1.0, 2.0, 0.0, 0.02, -0.02])
+
+
+def scan(port, age=0.01):
+    port.tell("scan", ros.laser_scan(ROOM, time.time() - age, "laser"))
+
+
+def mount(port):
+    port.tell("/tf_static", ros.transforms([("base_link", "laser", (0.2, 0.0, 0.0))], 0.0))
+
+
+def test_a_scan_and_a_goal_in_become_a_plan_and_pictures_out(node):
+    planner, port, link = node
+    mount(port)
+    scan(port)
+    assert planner.cycle(link, 0.0) is not None
+    assert planner.navigator.reached  # without a goal it stays where it is
+    # the goal lies in the map's frame, and that 1 m to the right of the odometry's
+    port.tell("/tf", ros.transforms([("map", "odom", (1.0, 0.0, 0.0))], 0.0))
+    port.tell("/move_base_simple/goal", ros.pose_stamped((5.0, 2.0, 0.0), 0.0, "map"))
+    time.sleep(0.03)
+    scan(port)
+    answer = planner.cycle(link, 0.0)
+    assert planner.navigator.goal == pytest.approx((4.0, 2.0))
+    assert answer.states[-1][0] > 1.1
+    assert link.offered[-1] is answer
+    assert len(link.beats) == 2
+    assert time.monotonic() - link.beats[-1] < 5.0
+    planner.show()
+    planner.tell(link)
+    assert len(port.said["plan"]) == 2
+    assert port.said["plan"][-1]["header"]["frame_id"] == "odom"
+    for topic in ("hidden", "icsb", "markers"):
+        assert len(port.said[topic]) == 1
+    (told,) = port.said["/diagnostics"][-1]["status"]
+    assert told["level"] == 0
+    assert {"key": "cycles", "value": "2"} in told["values"]
+
+
+def test_what_cannot_be_believed_is_counted_and_nothing_is_planned(node):
+    planner, port, link = node
+    scan(port)  # nobody knows where the range finder sits
+    assert planner.cycle(link, 0.0) is None
+    mount(port)
+    scan(port, age=20.0)
+    scan(port, age=-2.0)
+    assert planner.cycle(link, 0.0) is None
+    link.ready = False  # the executor brakes
+    time.sleep(0.03)
+    scan(port)
+    assert planner.cycle(link, 0.0) is None
+    assert not link.offered
+    assert not link.beats
+    reasons = " ".join(planner.unseen)
+    for said in ("no upright laser", "too old", "of the future", "no motion to plan from"):
+        assert said in reasons
+    planner.tell(link)
+    assert port.said["/diagnostics"][-1]["status"][0]["level"] == 1
+
+
+def test_names_from_outside_do_not_fill_the_memory(node):
+    planner, port, link = node
+    mount(port)
+    for n in range(MOST_REASONS + 8):
+        time.sleep(0.001)  # stamps increase
+        port.tell("scan", ros.laser_scan(ROOM, time.time(), f"laser_{n}"))
+        if n % 6 == 5:
+            time.sleep(0.001)
+            scan(port, age=0.0)  # a good one, so that no cycle waits
+            planner.cycle(link, 0.0)
+    assert len(planner.unseen) <= MOST_REASONS + 1
+
+
+def test_another_goal_keeps_what_is_known_and_held():
+    robot = DifferentialDrive(wheel_speed=1.0)
+    settings = Settings.for_robot(robot, object_speed=0.5, **{**SMALL, "cycle": 0.1})
+    navigator = Navigator(robot, settings, goal=(3.0, 0.0))
+    state = np.zeros(5)
+    held = navigator.update(ROOM, state)
+    model = navigator.model
+    navigator.head_for((0.0, 3.0))
+    assert navigator.goal == (0.0, 3.0)
+    assert navigator.held is held
+    assert navigator.model is model
+    with pytest.raises(ValueError, match="goal"):
+        navigator.head_for((math.nan, 0.0))
+    assert navigator.goal == (0.0, 3.0)
+    # the very same state one cycle later: it turns to the new goal
+    later = Scan(ROOM.ranges, ROOM.angle_min, ROOM.angle_increment, 8.0, (0, 0, 0), stamp=0.1)
+    answer = navigator.update(later, held.at(0.1))
+    assert navigator.record.goal == (0.0, 3.0)
+    assert answer.states[-1][2] > held.states[-1][2]
