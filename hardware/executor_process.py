@@ -17,6 +17,7 @@ import json
 import os
 import select
 import signal
+import stat
 import struct
 import subprocess
 import sys
@@ -146,8 +147,10 @@ class ExecutorProcess:
         """
         home = str(Path(__file__).parents[1])
         paths = [home, *filter(None, [os.environ.get("PYTHONPATH")])]
+        command = [sys.executable, "-m", "hardware.executor_process"]
         self.process = subprocess.Popen(
-            [sys.executable, "-m", "hardware.executor_process", config.to_json()],
+            # who starts it says who that is: asked for later, a parent that died by then is another
+            [*command, config.to_json(), str(os.getpid())],
             stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
@@ -178,14 +181,19 @@ class ExecutorProcess:
         return ended(self.process, within)
 
 
-def run(config: ExecutorConfig) -> None:
+def run(config: ExecutorConfig, parent: int) -> None:
     """Be an executor, until a signal or the death of whoever started this process ends it.
+
+    Args:
+        config: all else.
+        parent: process number of whoever started this one.
 
     Raises:
         ValueError: the configuration makes no sense.
     """
     config.directory.mkdir(mode=0o700, parents=True, exist_ok=True)
-    parent, asked = os.getppid(), []
+    check_private(config.directory)
+    asked: list[int] = []
 
     def leave(number: int, frame: FrameType | None) -> None:
         asked.append(number)
@@ -209,6 +217,22 @@ def run(config: ExecutorConfig) -> None:
     finally:
         executor.close()
         os.close(alone)
+
+
+def check_private(directory: Path) -> None:
+    """Who may enter the directory of the sockets may drive the robot.
+
+    Raises:
+        ValueError: somebody but this user may.
+    """
+    there = directory.stat()
+    if there.st_uid != os.geteuid() or there.st_mode & 0o077:
+        raise ValueError(
+            f"ExecutorConfig.directory = {directory} must be this user's and closed to all others,"
+            f" since who may enter it can drive the robot; its mode is"
+            f" {stat.S_IMODE(there.st_mode):o}, its owner {there.st_uid}; chmod 700 it, or name"
+            " one that does not exist yet"
+        )
 
 
 def _alone(directory: Path) -> int:
@@ -254,11 +278,13 @@ def _writer(log: int | None) -> Callable[[Tick], None] | None:
 
 
 def main() -> int:
-    if len(sys.argv) != 2:
+    if len(sys.argv) not in (2, 3):
         print("example: python -m hardware.executor_process CONFIGURATION", file=sys.stderr)
         return 2
     try:
-        run(ExecutorConfig.from_json(sys.argv[1]))
+        # by hand it ends with the shell that it was started from
+        parent = int(sys.argv[2]) if len(sys.argv) == 3 else os.getppid()
+        run(ExecutorConfig.from_json(sys.argv[1]), parent)
     except ValueError as error:
         print(error, file=sys.stderr)
         return 2
