@@ -19,28 +19,25 @@ from typing import Any
 import numpy as np
 
 from hardware.base import check_fits
+from hardware.chain import PlannerLoop, Sent, poser
 from hardware.chair_model import WALL_HALF, ChairNature
 from hardware.executor_process import ExecutorConfig, ExecutorProcess
 from hardware.link import PlannerLink
-from hardware.merge import Pairing, check_stamp_error, read_together
+from hardware.margins import APART, executor_settings
+from hardware.merge import check_stamp_error
 from hardware.scip_client import ScipClient
-from hardware.scip_receiver import Pose
 from hardware.scip_settings import ScipSettings
-from hardware.status import State
-from hardware.twin_figures import Chained, Sent, latencies, shares, ticks_of
+from hardware.twin_figures import Chained, latencies, shares, ticks_of
 from hardware.twin_process import BASE, TwinConfig, TwinProcess, put_forward
-from hardware.twin_settings import APART, executor_settings, settings_of
+from hardware.twin_settings import settings_of
 from passpmp_ti import door
 from passpmp_ti.grid.static_map import StaticMap
 from passpmp_ti.planner.navigator import Navigator
 from passpmp_ti.robots import DifferentialDrive
-from passpmp_ti.scan import Scan
 from passpmp_ti.sim.contacts import Contact
 from passpmp_ti.sim.drive import Drive
 from passpmp_ti.sim.episode import episode_of
 
-NOWHERE: Pose = (0.0, 0.0, 0.0)
-"""A range finder's pose at a time of which nothing is known; such scans are dropped."""
 STANDING = 0.01
 """Wheels that go no faster over ground than this are at rest, to the judge [m/s]: a chair that
 stands on tyres is never quite still."""
@@ -154,7 +151,7 @@ class Chain:
                         ScipSettings(
                             host="127.0.0.1", port=port, range_max=lidar.range_max,
                         ),
-                        pose_at=self._poser(lidar.pose),
+                        pose_at=poser(self.link, lidar.pose),
                     )
                 )
                 for port, lidar in zip(self.twin.ports, self.scenario.lidars, strict=True)
@@ -175,26 +172,21 @@ class Chain:
             seconds: longest [s].
             see: is shown how it goes, about once a second.
         """
-        pairing = Pairing(len(self.clients), apart=APART)
+        loop = PlannerLoop(self.navigator, self.link, self.clients, cycle=self.cycle, apart=APART)
         sent: list[Sent] = []
         idle = 0
-        began = due = time.monotonic()
+        began = time.monotonic()
         told_at, reached_at = began, None
         interrupted = False
         try:
             while time.monotonic() < began + seconds:
-                scans, arrived = self._scans(pairing, due)
-                due = max(due + self.cycle, time.monotonic() - self.cycle)
-                self.link.poll(timeout=0.02)
-                state = None if scans is None else self._state(scans[0].stamp)
-                if scans is None or state is None or not self.link.ready:
+                done = loop.round()
+                if done.sent is not None:
+                    sent.append(done.sent)
+                if done.took is None:
                     idle += 1
                 else:
-                    answer = self.navigator.update(scans, state, following=self.link.following)
-                    self.link.beat(scans[0].stamp)
-                    if self.link.offer(answer):
-                        sent.append(Sent(scans[0].stamp, arrived, time.monotonic(), answer.start))
-                    self.drive.note(self.navigator.record, time.monotonic() - arrived)
+                    self.drive.note(self.navigator.record, done.took)
                 now = time.monotonic()
                 if now - told_at >= TELL:
                     told_at = now
@@ -209,39 +201,6 @@ class Chain:
             interrupted = True
         self._judge()
         return self._chained(sent, idle, reached_at, interrupted)
-
-    def _scans(self, pairing: Pairing, due: float) -> tuple[tuple[Scan, ...] | None, float]:
-        """The first scans of one instant that come after `due`, and when; those before are read
-        and passed over, as the sockets hold few."""
-        until = max(due, time.monotonic())
-        while (left := until - time.monotonic()) > 0:
-            read_together(self.clients, pairing, left)
-            self.link.poll()
-        found = read_together(self.clients, pairing, 0.25)
-        arrived = time.monotonic()
-        if found is None or any(scan.pose == NOWHERE for scan in found):
-            return None, arrived
-        return found, arrived
-
-    def _poser(self, of_robot: Callable[[np.ndarray], Pose]) -> Callable[[float], Pose]:
-        """Where a range finder is, from where the executor says that the robot is."""
-
-        def pose_at(when: float) -> Pose:
-            state = self.link.state_at(when)
-            if state is None:
-                self.link.poll(timeout=0.005)
-                state = self.link.state_at(when)
-            return NOWHERE if state is None else of_robot(state)
-
-        return pose_at
-
-    def _state(self, when: float) -> np.ndarray | None:
-        """The robot's at a time; its wheels stand where the executor says that it rests: what
-        they seem to turn then is noise."""
-        state, status = self.link.state_at(when), self.link.status
-        if state is not None and status is not None and status.state is State.RESTING:
-            state[3:] = 0.0
-        return state
 
     def _judge(self) -> None:
         """Take note of what really happened since."""

@@ -6,10 +6,11 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
+from hardware.chain import Sent
 from hardware.executor import Tick
 from hardware.executor_process import ROW
 from hardware.scip_receiver import Counters
@@ -18,19 +19,6 @@ from passpmp_ti.sim.episode import Episode
 
 SOON = 0.05
 """An executor that takes a trajectory has taken it this long after it was sent [s]."""
-
-
-class Sent(NamedTuple):
-    """A trajectory that was sent to the executor; times on the monotonic clock [s]."""
-
-    stamp: float
-    """Of the scans that it was planned on."""
-    arrived: float
-    """When they were there."""
-    at: float
-    """When it was sent."""
-    start: float
-    """When it begins."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
