@@ -15,11 +15,9 @@ import gc
 import importlib
 import json
 import os
-import select
 import signal
 import stat
 import struct
-import subprocess
 import sys
 import time
 from collections.abc import Callable
@@ -29,10 +27,11 @@ from types import FrameType
 from typing import Any
 
 from hardware.base import Base
-from hardware.child import ended
+from hardware.child import ended, started
 from hardware.executor import Executor, Tick
 from hardware.executor_settings import ExecutorSettings
 from hardware.follower import FollowerSettings
+from hardware.priority import put_forward
 from passpmp_ti import door
 from passpmp_ti.robots import DifferentialDrive
 
@@ -145,25 +144,9 @@ class ExecutorProcess:
         Raises:
             RuntimeError: it did not start; says why.
         """
-        home = str(Path(__file__).parents[1])
-        paths = [home, *filter(None, [os.environ.get("PYTHONPATH")])]
-        command = [sys.executable, "-m", "hardware.executor_process"]
-        self.process = subprocess.Popen(
-            # who starts it says who that is: asked for later, a parent that died by then is another
-            [*command, config.to_json(), str(os.getpid())],
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            env={**os.environ, "PYTHONPATH": os.pathsep.join(paths)},
-            # a Ctrl-C is for the planner; what brakes is not to die of it
-            start_new_session=True,
-        )
-        assert self.process.stdout is not None
-        ready, _, _ = select.select([self.process.stdout], [], [], within)
-        if not ready or self.process.stdout.readline() != READY:
-            self.process.kill()
-            _, told = self.process.communicate()
-            raise RuntimeError(f"the executor did not start: {told.decode(errors='replace')}")
+        self.process, told = started("hardware.executor_process", config.to_json(), within)
+        if told != READY:
+            raise RuntimeError(f"the executor did not start: {ended(self.process, 1.0)}")
 
     def __enter__(self) -> ExecutorProcess:
         return self
@@ -202,7 +185,7 @@ def run(config: ExecutorConfig, parent: int) -> None:
         signal.signal(number, leave)
     alone = _alone(config.directory)
     if config.priority:
-        _put_first(config.priority)
+        put_forward("the executor", config.priority)
     log = None if config.log is None else os.open(config.log, os.O_WRONLY | os.O_CREAT, 0o600)
     executor = Executor(
         config.build_base(), config.robot, config.settings, config.directory, log=_writer(log)
@@ -256,13 +239,6 @@ def _alone(directory: Path) -> int:
             time.sleep(0.05)
         else:
             return descriptor
-
-
-def _put_first(priority: int) -> None:
-    try:
-        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(priority))
-    except (OSError, AttributeError) as cause:
-        print(f"the executor has no priority: {cause}; it may be late", file=sys.stderr)
 
 
 def _writer(log: int | None) -> Callable[[Tick], None] | None:

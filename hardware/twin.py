@@ -25,10 +25,11 @@ from hardware.executor_process import ExecutorConfig, ExecutorProcess
 from hardware.link import PlannerLink
 from hardware.margins import APART, executor_settings
 from hardware.merge import check_stamp_error
+from hardware.priority import put_forward
 from hardware.scip_client import ScipClient
 from hardware.scip_settings import ScipSettings
 from hardware.twin_figures import Chained, latencies, shares, ticks_of
-from hardware.twin_process import BASE, TwinConfig, TwinProcess, put_forward
+from hardware.twin_process import BASE, TwinConfig, TwinProcess
 from hardware.twin_settings import settings_of
 from passpmp_ti import door
 from passpmp_ti.grid.static_map import StaticMap

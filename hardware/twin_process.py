@@ -32,6 +32,7 @@ from hardware.chair_lidar import ChairLidar
 from hardware.chair_model import ChairNature
 from hardware.child import ended
 from hardware.mujoco_chair import MujocoChair
+from hardware.priority import put_forward
 from hardware.scip_device import Device
 from hardware.scip_emulator import Emulator
 from hardware.scip_rotor import Nature
@@ -222,15 +223,6 @@ def _emulated(
         return Device(source, now, nature)
 
     return Emulator(make)
-
-
-def put_forward(who: str, priority: int) -> None:
-    """Give all threads of this process a priority of SCHED_FIFO, or say that none is granted."""
-    try:
-        for thread in os.listdir("/proc/self/task"):
-            os.sched_setscheduler(int(thread), os.SCHED_FIFO, os.sched_param(priority))
-    except (OSError, AttributeError) as cause:
-        print(f"{who} has no priority: {cause}; it may be late", file=sys.stderr)
 
 
 def main() -> int:

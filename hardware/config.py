@@ -1,0 +1,304 @@
+"""A robot in full: its range finders, its base, what was measured of it, and where it shall go."""
+
+from __future__ import annotations
+
+import math
+import os
+import tempfile
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from hardware.base import BaseLimits, check_fits
+from hardware.base_kinds import KINDS, BaseKind
+from hardware.executor_settings import ExecutorSettings
+from hardware.follower import FollowerSettings
+from hardware.margins import APART, deceleration, executor_settings, with_margins
+from hardware.merge import check_stamp_error, needed_stamp_error
+from hardware.scip_settings import ScipSettings
+from passpmp_ti import door
+from passpmp_ti.robots import DifferentialDrive
+from passpmp_ti.settings import Settings
+
+FOR_STEERING = 0.9
+"""Share of the measured braking that may be planned with; the rest steers back to the plan."""
+RESERVE = 1.5
+"""The executor lets the robot off its path by so much more than was ever measured."""
+LEAST_BOUND = 0.02
+"""[m]; odometry itself has noise."""
+LOST_ODOMETRY = 3
+"""Odometries that may be missing before the executor calls the base silent."""
+FIELD_OF_VIEW = math.radians(270.0)
+"""Of a UST-10LX; `HALF_SWEEP` is of such a device too."""
+MARGINS = ("tracking_error", "localisation_error", "range_noise", "stamp_error", "deadline")
+"""Fields of `Settings` that come of what was measured."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Lidar:
+    """A range finder on the robot."""
+
+    name: str
+    """For people: "front", "rear"."""
+    scip: ScipSettings | None
+    """How it is reached; None: it is emulated."""
+    mount: tuple[float, float, float]
+    """(x, y, theta) on the robot, from midway between its driven wheels [m, m, rad]."""
+    range_max: float = 10.0
+    """How far it is believed [m]."""
+    range_noise: float = 0.04
+    """Greatest error of a range [m]; a UST-10LX's data sheet has 40 mm."""
+
+    def __post_init__(self) -> None:
+        door.array(f"lidar {self.name}", "mount", self.mount, (3,))
+        door.finite(f"lidar {self.name}", "range_max", self.range_max, above=0.0, unit="m")
+        door.finite(f"lidar {self.name}", "range_noise", self.range_noise, least=0.0, unit="m")
+
+    def pose(self, robot: Any) -> tuple[float, float, float]:
+        """(x, y, theta) in the world of the sensor on a robot at (x, y, theta, ...)."""
+        x, y, theta = (float(v) for v in robot[:3])
+        mx, my, turn = self.mount
+        c, s = math.cos(theta), math.sin(theta)
+        return x + c * mx - s * my, y + s * mx + c * my, theta + turn
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Measured:
+    """What somebody measured of the robot; docs/on-your-robot.md tells how. Each is the worst that
+    was seen on the worst floor, with the heaviest load, never a mean."""
+
+    braking_speed: float
+    """Speed at which it was told to stop [m/s]."""
+    braking_distance: float
+    """From where it was told to where it came to rest [m]."""
+    order_delay: float
+    """From an order to its effect [s]."""
+    wheel_lag: float = 0.05
+    """Time constant of the wheels' answer [s]."""
+    tracking_error: float
+    """Farthest off its path that it was [m]."""
+    rest_late: float = 0.1
+    """Longest that it rested after its path did [s]."""
+    localisation_error: float
+    """Greatest error of the told place [m]."""
+    heading_error: float
+    """Of the told heading [rad], and what it turns in half a sweep, 0.01 s, at its fastest."""
+
+    def __post_init__(self) -> None:
+        for above_0 in ("braking_speed", "braking_distance", "tracking_error", "rest_late"):
+            door.finite("measured", above_0, getattr(self, above_0), above=0.0)
+        for least_0 in ("order_delay", "wheel_lag", "localisation_error", "heading_error"):
+            door.finite("measured", least_0, getattr(self, least_0), least=0.0)
+
+    @property
+    def deceleration(self) -> float:
+        """How hard it brakes [m/s^2]."""
+        return deceleration(self.braking_speed, self.braking_distance)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BaseConfig:
+    """What drives the robot."""
+
+    kind: str
+    """A name in `base_kinds.KINDS`."""
+    fields: Mapping[str, Any] = field(default_factory=dict)
+    """What that kind asks for."""
+    wheel_speed: float
+    """Greatest ground speed of a wheel [m/s]."""
+    command_timeout: float
+    """It brakes by itself when it was told nothing for this long [s]."""
+    runs_on: float
+    """The longest way on its last order that is put up with if the executor dies [m]."""
+    odometry_period: float = 0.01
+    """Time from one odometry to the next [s]."""
+
+    def __post_init__(self) -> None:
+        door.choice("base", "kind", self.kind, KINDS)
+        for above_0 in ("wheel_speed", "command_timeout", "runs_on", "odometry_period"):
+            door.finite("base", above_0, getattr(self, above_0), above=0.0)
+
+    @property
+    def made_by(self) -> BaseKind:
+        """Its kind."""
+        return KINDS[self.kind]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Emulated:
+    """A world that is none, for range finders without an address and a simulated base."""
+
+    scenario: str
+    """Its walls and movers: a shipped name, or a file."""
+    seed: int = 0
+    walls_known: bool = False
+    """The planner gets what stands there as a map; False: all that is seen may move."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DriveConfig:
+    """All that `passpmp drive CONFIG` needs to know, checked as a whole."""
+
+    name: str
+    robot: DifferentialDrive
+    lidars: tuple[Lidar, ...]
+    base: BaseConfig
+    measured: Measured
+    planner: Settings
+    """As the file has them, without margins."""
+    goals: tuple[tuple[float, float], ...]
+    """[m], one after another."""
+    map: Path | None = None
+    """A map_server file of what stays."""
+    directory: Path
+    """Of the executor's sockets."""
+    button: Path | None = None
+    """An input device any key of which stops the robot; None: only `hardware.stop_button` does."""
+    emulated: Emulated | None = None
+
+    def __post_init__(self) -> None:
+        if not 1 <= len(self.lidars) <= 2:
+            raise ValueError(
+                f"lidars must list one range finder or two; got {len(self.lidars)}: stamps of more"
+                " are not known to lie near enough to each other"
+            )
+        if not self.goals:
+            raise ValueError("goals must hold at least one point [x, y]")
+        self._check_devices()
+        self._check_braking()
+        self._check_view()
+        executor, planner = self.executor_settings, self.planner_settings
+        executor.check_margins(planner, scan_age=self.scan_age)
+        check_fits(self.limits, self.robot)
+        executor.check_watchdog(self.limits, self.robot)
+        check_stamp_error(planner, self._scips, self.apart)
+        self.base_options()
+
+    @property
+    def limits(self) -> BaseLimits:
+        """Of the base, with the braking that was measured."""
+        return BaseLimits(
+            wheel_speed=self.base.wheel_speed,
+            acceleration=self.measured.deceleration,
+            track=self.robot.track,
+            command_timeout=self.base.command_timeout,
+        )
+
+    @property
+    def apart(self) -> float:
+        """Stamps of scans of one instant differ by this at the most [s]."""
+        return APART if len(self.lidars) > 1 else 0.0
+
+    @property
+    def scan_age(self) -> float:
+        """How much older than its stamp a beam may be [s]."""
+        return needed_stamp_error(self._scips, self.apart)
+
+    @property
+    def executor_settings(self) -> ExecutorSettings:
+        """The executor's, with what was measured."""
+        m = self.measured
+        usual = executor_settings(self.planner.cycle)
+        return executor_settings(
+            self.planner.cycle,
+            # an order is kept for a period, half of it on average
+            follower=FollowerSettings(
+                wheel_lag=m.wheel_lag, delay=m.order_delay + 0.5 * usual.period
+            ),
+            bound=max(RESERVE * m.tracking_error, LEAST_BOUND),
+            feedback_timeout=max(usual.feedback_timeout, LOST_ODOMETRY * self.base.odometry_period),
+            rest_late=m.rest_late,
+            runs_on=self.base.runs_on,
+        )
+
+    @property
+    def planner_settings(self) -> Settings:
+        """The planner's, with the margins of what was measured."""
+        m = self.measured
+        # a heading that is off moves what is far away the most
+        turned = m.heading_error * max(lidar.range_max for lidar in self.lidars)
+        return with_margins(
+            self.planner,
+            self.executor_settings,
+            cycle=self.planner.cycle,
+            localisation_error=m.localisation_error + turned,
+            range_noise=max(lidar.range_noise for lidar in self.lidars),
+            scan_age=self.scan_age,
+            top_speed=self.robot.top_speed,
+        )
+
+    def base_options(self) -> dict[str, Any]:
+        """What the base is made with."""
+        return self.base.made_by.options(self.base.fields, self.limits)
+
+    @property
+    def _scips(self) -> list[ScipSettings]:
+        """Of an emulated one only what any device has."""
+        return [lidar.scip or ScipSettings(host="127.0.0.1") for lidar in self.lidars]
+
+    def _check_devices(self) -> None:
+        if self.emulated is not None and self.base.kind != "simulated":
+            raise ValueError(
+                f"base.kind must be simulated where `emulated` has a world, since what range"
+                f" finders see there must move with the base; got {self.base.kind!r}; leave"
+                " `emulated` out for real devices"
+            )
+        for n, lidar in enumerate(self.lidars):
+            if lidar.scip is None and self.emulated is None:
+                raise ValueError(
+                    f"lidars[{n}].host is missing: give the device's address, 192.168.0.10 as it is"
+                    " delivered, or a world with `emulated: {scenario: corridor_person}`"
+                )
+            if lidar.scip is not None and self.emulated is not None:
+                raise ValueError(
+                    f"lidars[{n}].host = {lidar.scip.host!r} with `emulated`: a real range finder"
+                    " does not see a world that is none; leave one of the two out"
+                )
+        if self.emulated is not None and self.emulated.walls_known and self.map is not None:
+            raise ValueError(
+                "map with emulated.walls_known: there is one map of what stays; leave one of the"
+                " two out"
+            )
+        if len({lidar.name for lidar in self.lidars}) < len(self.lidars):
+            raise ValueError("lidars[1].name is that of the other; give each its own")
+
+    def _check_braking(self) -> None:
+        m, most = self.measured, FOR_STEERING * self.measured.deceleration
+        if self.robot.acceleration > most:
+            raise ValueError(
+                f"robot.acceleration = {self.robot.acceleration:g} m/s^2 must be <= {most:.3g}:"
+                f" measured.braking_distance = {m.braking_distance:g} m from"
+                f" measured.braking_speed = {m.braking_speed:g} m/s is {m.deceleration:.3g} m/s^2,"
+                " and a tenth of it is for steering back to the plan; lower robot.acceleration"
+            )
+        if self.robot.wheel_speed > m.braking_speed:
+            raise ValueError(
+                f"robot.wheel_speed = {self.robot.wheel_speed:g} m/s is above"
+                f" measured.braking_speed = {m.braking_speed:g} m/s: nobody saw it brake from"
+                " there; measure at the speed that is planned with, or lower robot.wheel_speed"
+            )
+
+    def _check_view(self) -> None:
+        blind = self.planner.blind_speed
+        if blind is not None and blind < self.planner.object_speed:
+            return
+        half = 0.5 * FIELD_OF_VIEW
+        headings = [lidar.mount[2] for lidar in self.lidars]
+        # the middle between two range finders, and opposite to one, is where none looks
+        apart = abs(math.remainder(headings[-1] - headings[0], math.tau))
+        if len(headings) == 1 or math.pi - 0.5 * apart >= half:
+            raise ValueError(
+                "planner.blind_speed is missing: the range finders do not look all round, and out"
+                " of bearings that none covers anything may come, so the robot would never move;"
+                " add a second one behind, or bound what is there with planner.blind_speed and"
+                " planner.clear_radius (docs/add-a-sensor.md, blind sectors)"
+            )
+
+
+def usual_directory() -> Path:
+    """Where the executor's sockets are unless the file says so."""
+    runtime = os.environ.get("XDG_RUNTIME_DIR")
+    if runtime:
+        return Path(runtime) / "passpmp"
+    return Path(tempfile.gettempdir()) / f"passpmp-{os.geteuid()}"

@@ -1,0 +1,400 @@
+"""A robot from its file: devices, executor, planner, and a drive to its goals."""
+
+from __future__ import annotations
+
+import json
+import math
+import signal
+import time
+from collections import Counter
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from types import FrameType
+from typing import Any
+
+import numpy as np
+
+from hardware.button_device import READY
+from hardware.chain import PlannerLoop, Round, poser
+from hardware.child import ended, started
+from hardware.complaints import advice
+from hardware.config import DriveConfig
+from hardware.emulated_process import BASE, EmulatedConfig, EmulatedProcess
+from hardware.executor_process import ExecutorConfig, ExecutorProcess, check_private
+from hardware.link import PlannerLink
+from hardware.scip_client import ScipClient, wait
+from hardware.scip_settings import ScipSettings
+from hardware.status import State, Status
+from hardware.stop_button import StopButton
+from passpmp_ti.grid.static_map import StaticMap
+from passpmp_ti.planner.navigator import Navigator
+from passpmp_ti.sim.scenario import load_scenario
+
+START = 10.0
+"""[s] for range finders and base to answer."""
+TELL = 1.0
+"""From one line of progress to the next [s]."""
+LOOK = 0.05
+"""[s] between two looks at a robot that comes to rest."""
+LONGEST_REST = 20.0
+"""[s] after which a robot that should have come to rest is stopped by the button."""
+
+
+@dataclass(frozen=True, slots=True)
+class Look:
+    """How it goes."""
+
+    time: float
+    """Since the drive began [s]."""
+    record: Any
+    """The navigator's last."""
+    away: float
+    """From the goal, by what is known [m]."""
+    speed: float
+    """[m/s]."""
+    status: Status | None
+    """The executor's."""
+    silent: tuple[str, ...]
+    """Range finders that are not heard, and why."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Driven:
+    """What a drive came to."""
+
+    name: str
+    reached: bool
+    interrupted: bool
+    """By Ctrl-C."""
+    why: str
+    """Why it ended."""
+    seconds: float
+    cycle: float
+    rounds: int
+    """Cycles."""
+    idle: int
+    """Those without a scan or a known pose, or while the robot braked."""
+    sent: int
+    """Trajectories."""
+    refused: int
+    """Of those that the executor judged."""
+    took: np.ndarray
+    """From a scan's arrival to the planner's answer, sent, each [s]."""
+    decisions: dict[str, int]
+    worst_error: float
+    """Farthest off its path, as the executor measured it [m]."""
+    lost: dict[str, int]
+    """Links lost, of each range finder."""
+
+    def summary(self) -> dict[str, Any]:
+        """In numbers, SI units."""
+        told: dict[str, Any] = {
+            key: getattr(self, key)
+            for key in (
+                "name", "reached", "interrupted", "why", "seconds", "cycle", "rounds", "idle",
+                "sent", "refused", "decisions", "lost",
+            )
+        }  # fmt: skip
+        told["worst_error"] = None if math.isnan(self.worst_error) else self.worst_error
+        for key, share in (("median", 0.5), ("p99", 0.99)):
+            told[f"took_{key}"] = float(np.quantile(self.took, share)) if len(self.took) else None
+        return told
+
+
+class Interrupts:
+    """Counts Ctrl-C (and SIGTERM) instead of dying of it."""
+
+    def __init__(self) -> None:
+        self.count = 0
+
+    def hear(self, number: int, frame: FrameType | None) -> None:
+        """One more."""
+        self.count += 1
+
+
+@contextmanager
+def interrupts() -> Iterator[Interrupts]:
+    """While this is open, Ctrl-C ends nothing by itself."""
+    heard = Interrupts()
+    before = {n: signal.signal(n, heard.hear) for n in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield heard
+    finally:
+        for number, old in before.items():
+            signal.signal(number, old)
+
+
+class RobotDrive:
+    """All of it, running: devices where they are emulated, executor, range finders, navigator.
+
+    with RobotDrive(read_config(path)) as drive:
+        print(drive.run().summary())
+    """
+
+    def __init__(self, config: DriveConfig, *, seed: int = 0) -> None:
+        """
+        Args:
+            config: of the robot.
+            seed: of the planner.
+
+        Raises:
+            ValueError: the map cannot be read.
+        """
+        self.config = config
+        # kernels are compiled before anything waits for them
+        self.navigator = Navigator(
+            config.robot, config.planner_settings, goal=config.goals,
+            static_map=_known(config), seed=seed,
+        )  # fmt: skip
+        self._open = ExitStack()
+
+    def __enter__(self) -> RobotDrive:
+        """
+        Raises:
+            ValueError: the directory is not private.
+            RuntimeError: a process does not start, or a device does not answer.
+        """
+        config = self.config
+        with ExitStack() as open_:
+            config.directory.mkdir(mode=0o700, parents=True, exist_ok=True)
+            check_private(config.directory)
+            settings, options = self._devices(open_)
+            self.executor = ExecutorProcess(
+                ExecutorConfig(
+                    directory=config.directory,
+                    base=options.pop("base"),
+                    base_options=options,
+                    robot=config.robot,
+                    settings=config.executor_settings,
+                )
+            )
+            open_.callback(self.executor.close)
+            if config.button is not None:
+                told = {"directory": str(config.directory), "device": str(config.button)}
+                button, said = started("hardware.button_device", json.dumps(told), START)
+                open_.callback(ended, button, 1.0)
+                if said != READY:
+                    raise RuntimeError(f"the stop button did not start: {said!r}")
+            self.link = open_.enter_context(PlannerLink(config.directory, track=config.robot.track))
+            self.clients = [
+                open_.enter_context(ScipClient(one, pose_at=poser(self.link, lidar.pose)))
+                for one, lidar in zip(settings, config.lidars, strict=True)
+            ]
+            self._await_devices()
+            self._open = open_.pop_all()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._open.close()
+
+    def run(self, seconds: float = math.inf, see: Callable[[Look], None] | None = None) -> Driven:
+        """Drive until the last goal is reached, the time is over, or Ctrl-C.
+
+        The first Ctrl-C lets the robot come to rest on what it holds, as the end of the time does;
+        the second one presses the emergency stop, which stays pressed until it is reset.
+
+        Args:
+            seconds: longest [s].
+            see: is shown how it goes, about once a second.
+        """
+        loop = PlannerLoop(
+            self.navigator, self.link, self.clients,
+            cycle=self.config.planner.cycle, apart=self.config.apart,
+        )  # fmt: skip
+        rounds: list[Round] = []
+        decisions: Counter[str] = Counter()
+        began = told_at = time.monotonic()
+        with interrupts() as heard:
+            why = ""
+            while not why:
+                rounds.append(loop.round())
+                if rounds[-1].took is not None:
+                    decisions[self.navigator.record.decision] += 1
+                now = time.monotonic()
+                why = self._ends(loop, heard, now - began, seconds)
+                if see is not None and now - told_at >= TELL:
+                    told_at = now
+                    see(self._look(now - began))
+            why = self._to_rest(why, heard)
+        status = self.link.status
+        return Driven(
+            name=self.config.name, reached=self.navigator.reached,
+            interrupted=heard.count > 0, why=why,
+            seconds=time.monotonic() - began, cycle=self.config.planner.cycle,
+            rounds=len(rounds), idle=sum(one.took is None for one in rounds),
+            sent=sum(one.sent is not None for one in rounds),
+            refused=0 if status is None else status.refused,
+            took=np.array([one.took for one in rounds if one.took is not None]),
+            decisions=dict(decisions),
+            worst_error=math.nan if status is None else status.worst_error,
+            lost={
+                lidar.name: client.counters.lost
+                for lidar, client in zip(self.config.lidars, self.clients, strict=True)
+            },
+        )  # fmt: skip
+
+    def _devices(self, open_: ExitStack) -> tuple[list[ScipSettings], dict[str, Any]]:
+        """Settings of the range finders; what the base is made with, and by what, as "base"."""
+        config = self.config
+        if config.emulated is None:
+            real = [lidar.scip for lidar in config.lidars if lidar.scip is not None]
+            return real, {"base": config.base.made_by.build, **config.base_options()}
+        devices = EmulatedProcess(
+            EmulatedConfig(
+                directory=config.directory,
+                scenario=config.emulated.scenario,
+                seed=config.emulated.seed,
+                mounts=tuple(lidar.mount for lidar in config.lidars),
+                # errors are cut at three deviations: what is declared holds
+                noise=min(lidar.range_noise for lidar in config.lidars) / 3.0,
+                limits=config.limits,
+            )
+        )
+        open_.callback(devices.close)
+        emulated = [
+            ScipSettings(host="127.0.0.1", port=port, range_max=lidar.range_max)
+            for port, lidar in zip(devices.ports, config.lidars, strict=True)
+        ]
+        limits = config.base_options()["limits"]
+        address = str(config.directory / BASE)
+        return emulated, {"base": "hardware.base_link:build", "address": address, **limits}
+
+    def _await_devices(self) -> None:
+        """Wait until all of them answer.
+
+        Raises:
+            RuntimeError: one does not; says which, and what to look at.
+        """
+        until = time.monotonic() + START
+        missing = True
+        while missing and time.monotonic() < until:
+            for client in self.clients:
+                client.read(0.0)
+            wait(self.clients, LOOK)
+            self.link.poll()
+            missing = bool(self._silent()) or not self.link.ready
+        if silent := self._silent():
+            raise RuntimeError("\n".join(silent))
+        if missing:
+            raise RuntimeError(self._base_trouble())
+
+    def _silent(self) -> tuple[str, ...]:
+        told = []
+        for lidar, client in zip(self.config.lidars, self.clients, strict=True):
+            if client.streaming:
+                continue
+            s = client.settings
+            trouble = client.trouble or "no answer yet"
+            told.append(
+                f"range finder {lidar.name!r} at {s.host}:{s.port}: {trouble}; {advice(s, trouble)}"
+            )
+        return tuple(told)
+
+    def _base_trouble(self) -> str:
+        status, base = self.link.status, self.config.base
+        where = base.made_by.reach(base.fields)
+        if status is None:
+            return f"the executor does not answer in {self.config.directory}"
+        if status.state is State.EMERGENCY:
+            return (
+                "the emergency stop is pressed; let go of it with"
+                f" python -m hardware.stop_button {self.config.directory} --reset"
+            )
+        return (
+            f"the base ({base.kind}, {where}) does not say where it stands, at rest"
+            f" ({status.reason.name.lower()}): is what serves it running, does odometry come, do"
+            " its wheels rest?"
+        )
+
+    def _ends(self, loop: PlannerLoop, heard: Interrupts, since: float, seconds: float) -> str:
+        """Why the drive is over; "" where it is not."""
+        if heard.count:
+            return "interrupted"
+        if self.navigator.reached:
+            return "the goal is reached"
+        if since > seconds:
+            return "the time is over"
+        if loop.slept:
+            return "the machine was asleep, and what was seen before holds no more"
+        if not self.executor.alive:
+            return "the executor is gone; the base brakes by itself"
+        return ""
+
+    def _to_rest(self, why: str, heard: Interrupts) -> str:
+        """Nothing more is planned: wait until the robot rests on what is held."""
+        began, already = time.monotonic(), heard.count
+        while self.executor.alive:
+            self.link.poll(timeout=LOOK)
+            status = self.link.status
+            if status is not None and status.state in (
+                State.RESTING, State.STOPPED, State.EMERGENCY,
+            ):  # fmt: skip
+                return why
+            late = time.monotonic() - began > LONGEST_REST
+            if late or heard.count > max(already, 1):
+                with StopButton(self.config.directory) as button:
+                    obeyed = button.press()
+                return (
+                    f"{why}; the emergency stop is pressed"
+                    + ("" if obeyed else ", and the executor does not obey")
+                    + f"; let go of it with python -m hardware.stop_button"
+                    f" {self.config.directory} --reset"
+                )
+            time.sleep(LOOK)
+        return why
+
+    def _look(self, since: float) -> Look:
+        status = self.link.status
+        here = None if status is None or not status.odometry else status.odometry[-1]
+        goal = self.navigator.goal
+        return Look(
+            time=since,
+            record=self.navigator.record,
+            away=math.nan if here is None else math.hypot(goal[0] - here.x, goal[1] - here.y),
+            speed=math.nan if here is None else 0.5 * (here.right + here.left),
+            status=status,
+            silent=self._silent(),
+        )
+
+
+def line(look: Look) -> str:
+    """One line of progress, and one for each range finder that is silent."""
+    state = "silent" if look.status is None else look.status.state.name.lower()
+    told = (
+        f"t {look.time:6.1f} s   to goal {look.away:6.1f} m   speed {look.speed:6.2f} m/s  "
+        f" {look.record.decision:<8} {state:<12} {look.record.reason}"
+    )
+    return "\n".join([told.rstrip(), *look.silent])
+
+
+def report(told: dict[str, Any]) -> str:
+    """A drive's summary as text."""
+    took = [told[f"took_{share}"] for share in ("median", "p99")]
+    decisions = ", ".join(f"{name} {n}" for name, n in sorted(told["decisions"].items())) or "none"
+    error = told["worst_error"]
+    lost = ", ".join(f"{name} {n}" for name, n in told["lost"].items())
+    return (
+        f"\n{told['name']}: {told['why']}, after {told['seconds']:.1f} s\n"
+        f"cycles of {told['cycle']:g} s: {told['rounds']}, {told['idle']} of them without a scan or"
+        f" a known pose; decisions: {decisions}\n"
+        "scan's arrival to new trajectory: "
+        + (
+            "none"
+            if None in took
+            else f"median {1e3 * took[0]:.1f} ms, 99 % {1e3 * took[1]:.1f} ms"
+        )
+        + f"\ntrajectories: {told['sent']} sent, {told['refused']} refused; off its path by"
+        f" {'?' if error is None else f'{1e3 * error:.0f}'} mm at the most\n"
+        f"links lost: {lost}"
+    )
+
+
+def _known(config: DriveConfig) -> StaticMap | None:
+    """What is known to stay."""
+    if config.map is not None:
+        return StaticMap.load(config.map)
+    if config.emulated is None or not config.emulated.walls_known:
+        return None
+    world, _, _ = load_scenario(config.emulated.scenario).build(config.emulated.seed)
+    return StaticMap.from_segments(world.outline)
