@@ -9,7 +9,7 @@ import time
 from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from types import FrameType
 from typing import Any
 
@@ -39,6 +39,9 @@ LOOK = 0.05
 """[s] between two looks at a robot that comes to rest."""
 LONGEST_REST = 20.0
 """[s] after which a robot that should have come to rest is stopped by the button."""
+
+STANDS = (State.RESTING, State.STOPPED, State.EMERGENCY)
+"""What an executor does with a robot that has come to rest, or is told to by nobody else."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -125,6 +128,42 @@ def interrupts() -> Iterator[Interrupts]:
             signal.signal(number, old)
 
 
+@contextmanager
+def devices(config: DriveConfig) -> Iterator[tuple[list[ScipSettings], str, dict[str, Any]]]:
+    """Settings of the range finders, what makes the base, and what that is called with. Those that
+    are emulated live while this is open.
+
+    Raises:
+        RuntimeError: emulated ones do not start.
+    """
+    if config.emulated is None:
+        real = [lidar.scip for lidar in config.lidars if lidar.scip is not None]
+        yield real, config.base.made_by.build, config.base_options()
+        return
+    process = EmulatedProcess(
+        EmulatedConfig(
+            directory=config.directory,
+            scenario=config.emulated.scenario,
+            seed=config.emulated.seed,
+            mounts=tuple(lidar.mount for lidar in config.lidars),
+            # errors are cut at three deviations: what is declared holds
+            noise=min(lidar.range_noise for lidar in config.lidars) / 3.0,
+            limits=config.limits,
+        )
+    )
+    try:
+        emulated = [
+            ScipSettings(host="127.0.0.1", port=port, range_max=lidar.range_max)
+            for port, lidar in zip(process.ports, config.lidars, strict=True)
+        ]
+        address = str(config.directory / BASE)
+        yield (
+            emulated, "hardware.base_link:build", {"address": address, **asdict(config.limits)},
+        )  # fmt: skip
+    finally:
+        process.close()
+
+
 class RobotDrive:
     """All of it, running: devices where they are emulated, executor, range finders, navigator.
 
@@ -159,11 +198,11 @@ class RobotDrive:
         with ExitStack() as open_:
             config.directory.mkdir(mode=0o700, parents=True, exist_ok=True)
             check_private(config.directory)
-            settings, options = self._devices(open_)
+            settings, build, options = open_.enter_context(devices(config))
             self.executor = ExecutorProcess(
                 ExecutorConfig(
                     directory=config.directory,
-                    base=options.pop("base"),
+                    base=build,
                     base_options=options,
                     robot=config.robot,
                     settings=config.executor_settings,
@@ -234,32 +273,6 @@ class RobotDrive:
             },
         )  # fmt: skip
 
-    def _devices(self, open_: ExitStack) -> tuple[list[ScipSettings], dict[str, Any]]:
-        """Settings of the range finders; what the base is made with, and by what, as "base"."""
-        config = self.config
-        if config.emulated is None:
-            real = [lidar.scip for lidar in config.lidars if lidar.scip is not None]
-            return real, {"base": config.base.made_by.build, **config.base_options()}
-        devices = EmulatedProcess(
-            EmulatedConfig(
-                directory=config.directory,
-                scenario=config.emulated.scenario,
-                seed=config.emulated.seed,
-                mounts=tuple(lidar.mount for lidar in config.lidars),
-                # errors are cut at three deviations: what is declared holds
-                noise=min(lidar.range_noise for lidar in config.lidars) / 3.0,
-                limits=config.limits,
-            )
-        )
-        open_.callback(devices.close)
-        emulated = [
-            ScipSettings(host="127.0.0.1", port=port, range_max=lidar.range_max)
-            for port, lidar in zip(devices.ports, config.lidars, strict=True)
-        ]
-        limits = config.base_options()["limits"]
-        address = str(config.directory / BASE)
-        return emulated, {"base": "hardware.base_link:build", "address": address, **limits}
-
     def _await_devices(self) -> None:
         """Wait until all of them answer.
 
@@ -323,26 +336,27 @@ class RobotDrive:
 
     def _to_rest(self, why: str, heard: Interrupts) -> str:
         """Nothing more is planned: wait until the robot rests on what is held."""
-        began, already = time.monotonic(), heard.count
+        until = time.monotonic() + LONGEST_REST
         while self.executor.alive:
+            if heard.count > 1 or time.monotonic() > until:
+                return f"{why}; {self._press()}"
             self.link.poll(timeout=LOOK)
             status = self.link.status
-            if status is not None and status.state in (
-                State.RESTING, State.STOPPED, State.EMERGENCY,
-            ):  # fmt: skip
+            if status is not None and status.state in STANDS:
                 return why
-            late = time.monotonic() - began > LONGEST_REST
-            if late or heard.count > max(already, 1):
-                with StopButton(self.config.directory) as button:
-                    obeyed = button.press()
-                return (
-                    f"{why}; the emergency stop is pressed"
-                    + ("" if obeyed else ", and the executor does not obey")
-                    + f"; let go of it with python -m hardware.stop_button"
-                    f" {self.config.directory} --reset"
-                )
             time.sleep(LOOK)
         return why
+
+    def _press(self) -> str:
+        """Stop for good, and tell of it."""
+        directory = self.config.directory
+        with StopButton(directory) as button:
+            if not button.press():
+                return "the emergency stop was pressed, and the executor does not obey"
+        return (
+            "the emergency stop is pressed; let go of it with"
+            f" python -m hardware.stop_button {directory} --reset"
+        )
 
     def _look(self, since: float) -> Look:
         status = self.link.status

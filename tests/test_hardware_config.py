@@ -275,7 +275,8 @@ def drive(config, presses):
         return driven, robot.link.status, seen
 
 
-def test_ctrl_c_brings_the_robot_to_rest(tmp_path):
+def test_ctrl_c_brings_the_robot_to_rest(tmp_path, monkeypatch):
+    monkeypatch.setattr(on_robot, "TELL", 0.4)
     driven, status, seen = drive(emulated(tmp_path), presses=1)
     assert seen[0].speed > 0.05
     assert seen[0].silent == ()
