@@ -14,7 +14,7 @@ from hardware.base import BaseLimits, check_fits
 from hardware.base_kinds import KINDS, BaseKind
 from hardware.executor_settings import ExecutorSettings
 from hardware.follower import FollowerSettings
-from hardware.margins import APART, deceleration, executor_settings, with_margins
+from hardware.margins import APART, HALF_SWEEP, deceleration, executor_settings, with_margins
 from hardware.merge import check_stamp_error, needed_stamp_error
 from hardware.scip_settings import ScipSettings
 from passpmp_ti import door
@@ -25,6 +25,8 @@ FOR_STEERING = 0.9
 """Share of the measured braking that may be planned with; the rest steers back to the plan."""
 RESERVE = 1.5
 """The executor lets the robot off its path by so much more than was ever measured."""
+BRISK = 2.0
+"""Wheels change their speed no more than so many times as fast as they were seen to brake."""
 LEAST_BOUND = 0.02
 """[m]; odometry itself has noise."""
 LOST_ODOMETRY = 3
@@ -83,7 +85,7 @@ class Measured:
     localisation_error: float
     """Greatest error of the told place [m]."""
     heading_error: float
-    """Of the told heading [rad], and what it turns in half a sweep, 0.01 s, at its fastest."""
+    """Greatest error of the told heading [rad]."""
 
     def __post_init__(self) -> None:
         for above_0 in ("braking_speed", "braking_distance", "tracking_error", "rest_late"):
@@ -213,11 +215,25 @@ class DriveConfig:
         )
 
     @property
+    def heading_error(self) -> float:
+        """Greatest error of a beam's heading [rad]: that of what is told, and what the robot turned
+        since that was measured."""
+        turn_rate = self.robot.top_turn_rate
+        # wheels may change faster than they surely brake: a measured distance has delays in it
+        change = 2.0 * BRISK * self.limits.acceleration / self.robot.track
+        since = self.base.odometry_period + HALF_SWEEP
+        error = self.measured.heading_error + 0.5 * change * since**2
+        # all beams have the heading of the sweep's middle where the field must stay the same
+        return error if self.looks_all_round else error + turn_rate * HALF_SWEEP
+
+    @property
     def planner_settings(self) -> Settings:
         """The planner's, with the margins of what was measured."""
-        m = self.measured
+        m, robot = self.measured, self.robot
         # a heading that is off moves what is far away the most
-        turned = m.heading_error * max(lidar.range_max for lidar in self.lidars)
+        turned = self.heading_error * max(lidar.range_max for lidar in self.lidars)
+        # what sits far out swings faster than the robot drives
+        out = max(math.hypot(*lidar.mount[:2]) for lidar in self.lidars)
         return with_margins(
             self.planner,
             self.executor_settings,
@@ -225,7 +241,7 @@ class DriveConfig:
             localisation_error=m.localisation_error + turned,
             range_noise=max(lidar.range_noise for lidar in self.lidars),
             scan_age=self.scan_age,
-            top_speed=self.robot.top_speed,
+            top_speed=max(robot.top_speed, out * robot.top_turn_rate),
         )
 
     def base_options(self) -> dict[str, Any]:
@@ -279,21 +295,24 @@ class DriveConfig:
                 " there; measure at the speed that is planned with, or lower robot.wheel_speed"
             )
 
+    @property
+    def looks_all_round(self) -> bool:
+        """Whether every bearing is covered by a range finder."""
+        headings = [lidar.mount[2] for lidar in self.lidars]
+        # the middle between two of them, on the wide side, is where neither may look
+        apart = abs(math.remainder(headings[-1] - headings[0], math.tau))
+        return len(headings) > 1 and math.pi - 0.5 * apart < 0.5 * FIELD_OF_VIEW
+
     def _check_view(self) -> None:
         blind = self.planner.blind_speed
-        if blind is not None and blind < self.planner.object_speed:
+        if self.looks_all_round or (blind is not None and blind < self.planner.object_speed):
             return
-        half = 0.5 * FIELD_OF_VIEW
-        headings = [lidar.mount[2] for lidar in self.lidars]
-        # the middle between two range finders, and opposite to one, is where none looks
-        apart = abs(math.remainder(headings[-1] - headings[0], math.tau))
-        if len(headings) == 1 or math.pi - 0.5 * apart >= half:
-            raise ValueError(
-                "planner.blind_speed is missing: the range finders do not look all round, and out"
-                " of bearings that none covers anything may come, so the robot would never move;"
-                " add a second one behind, or bound what is there with planner.blind_speed and"
-                " planner.clear_radius (docs/add-a-sensor.md, blind sectors)"
-            )
+        raise ValueError(
+            "planner.blind_speed is missing: the range finders do not look all round, and out"
+            " of bearings that none covers anything may come, so the robot would never move;"
+            " add a second one behind, or bound what is there with planner.blind_speed and"
+            " planner.clear_radius (docs/add-a-sensor.md, blind sectors)"
+        )
 
 
 def usual_directory() -> Path:

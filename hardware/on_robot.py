@@ -9,7 +9,7 @@ import time
 from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from types import FrameType
 from typing import Any
 
@@ -137,7 +137,11 @@ def devices(config: DriveConfig) -> Iterator[tuple[list[ScipSettings], str, dict
         RuntimeError: emulated ones do not start.
     """
     if config.emulated is None:
-        real = [lidar.scip for lidar in config.lidars if lidar.scip is not None]
+        real = [
+            replace(lidar.scip, straighten=config.looks_all_round)
+            for lidar in config.lidars
+            if lidar.scip is not None
+        ]
         yield real, config.base.made_by.build, config.base_options()
         return
     process = EmulatedProcess(
@@ -153,7 +157,12 @@ def devices(config: DriveConfig) -> Iterator[tuple[list[ScipSettings], str, dict
     )
     try:
         emulated = [
-            ScipSettings(host="127.0.0.1", port=port, range_max=lidar.range_max)
+            ScipSettings(
+                host="127.0.0.1",
+                port=port,
+                range_max=lidar.range_max,
+                straighten=config.looks_all_round,
+            )
             for port, lidar in zip(process.ports, config.lidars, strict=True)
         ]
         address = str(config.directory / BASE)

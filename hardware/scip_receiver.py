@@ -17,6 +17,9 @@ from passpmp_ti.scan import Scan
 UNEVEN = 0.01
 """Relative error of a device's speed of turning: a UST was seen to turn 0.2 % slower than told."""
 
+MOST_TURN = 0.5
+"""[rad] by which a sensor turns in a sweep at the most: poses that say more are wrong."""
+
 Pose = tuple[float, float, float]
 
 
@@ -46,7 +49,8 @@ class Counters:
     unstable: int = 0
     """Sweeps that the device itself called so; it sends none."""
     unsure: int = 0
-    """Sweeps that could not be promised their stamp error; not handed out."""
+    """Sweeps that could not be promised their stamp error, or of which it is not known from where;
+    not handed out."""
     late: int = 0
     """Scans that were handed out, but had come late."""
     passed: int = 0
@@ -77,7 +81,8 @@ class Receiver:
             command: that is answered with these sweeps.
             clock: of the device; is told when sweeps came.
             counters: are counted on.
-            pose_at: the sensor's pose in the world at a time; None: (0, 0, 0).
+            pose_at: the sensor's pose in the world at a time, NaN where it is not known: such
+                scans are not handed out; None: (0, 0, 0).
         """
         self.doubts = False
         """Whether a sweep could not be promised its stamp error, since `clocks_compared`."""
@@ -132,10 +137,14 @@ class Receiver:
             counters.unsure += 1
             self.doubts = True
             return None
+        scan = self._scan(sweep, begin, end)
+        if scan is None:
+            counters.unsure += 1
+            return None
         self._stamp = end
         counters.scans += 1
         counters.late += int(at - end > self._settings.late)
-        return self._scan(sweep, begin, end)
+        return scan
 
     def _is_frozen(self, sweep: Sweep) -> bool:
         same = np.array_equal(sweep.distances, self._seen)
@@ -144,7 +153,9 @@ class Receiver:
         most = self._settings.frozen_after
         return most > 0 and self._same_in_row >= most
 
-    def _scan(self, sweep: Sweep, begin: float, end: float) -> Scan:
+    def _scan(self, sweep: Sweep, begin: float, end: float) -> Scan | None:
+        """None where it is not known from where, or the sensor is said to turn as no robot does,
+        or by so much that its beams would go more than once round."""
         settings, command, parameters = self._settings, self._command, self._parameters
         ranges = ranges_of(sweep.distances, parameters, settings.codes, settings.range_max)
         # a value stands for the middle of the steps that share it
@@ -152,13 +163,27 @@ class Receiver:
         low = parameters.angle(command.start + middle)
         high = parameters.angle(command.end - middle)
         if settings.upside_down:
-            ranges, low = ranges[::-1], -high
+            ranges, low, high = ranges[::-1], -high, -low
+        # halfway through the sweep it is off by the least
+        pose = (0.0, 0.0, 0.0) if self._pose_at is None else self._pose_at(0.5 * (begin + end))
+        if not all(map(math.isfinite, pose)):
+            return None
+        increment = parameters.angle(command.cluster) - parameters.angle(0)
+        if settings.straighten and self._pose_at is not None:
+            before, after = self._pose_at(begin), self._pose_at(end)
+            if settings.upside_down:
+                before, after = after, before
+            turns = [math.remainder(one[2] - pose[2], math.tau) for one in (before, after)]
+            low, high = low + turns[0], high + turns[1]
+            # a number that is none is no turn either
+            if not (max(map(abs, turns)) <= MOST_TURN and high - low <= math.tau):
+                return None
+            increment = (high - low) / (len(ranges) - 1)
         return Scan(
             ranges,
             angle_min=low,
-            angle_increment=parameters.angle(command.cluster) - parameters.angle(0),
+            angle_increment=increment,
             range_max=settings.range_max,
-            # halfway through the sweep it is off by the least
-            pose=(0.0, 0.0, 0.0) if self._pose_at is None else self._pose_at(0.5 * (begin + end)),
+            pose=pose,
             stamp=end,
         )
