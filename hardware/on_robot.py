@@ -24,6 +24,7 @@ from hardware.emulated_process import BASE, EmulatedConfig, EmulatedProcess
 from hardware.executor_process import ExecutorConfig, ExecutorProcess, check_private
 from hardware.link import PlannerLink
 from hardware.scip_client import ScipClient, wait
+from hardware.scip_session import Unfit
 from hardware.scip_settings import ScipSettings
 from hardware.status import State, Status
 from hardware.stop_button import StopButton
@@ -256,7 +257,11 @@ class RobotDrive:
         with interrupts() as heard:
             why = ""
             while not why:
-                rounds.append(loop.round())
+                try:
+                    rounds.append(loop.round())
+                except Unfit as cause:  # another device answers at that address now
+                    why = f"a range finder cannot do what its section asks: {cause}"
+                    break
                 if rounds[-1].took is not None:
                     decisions[self.navigator.record.decision] += 1
                 now = time.monotonic()

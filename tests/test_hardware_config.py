@@ -1,16 +1,19 @@
 """A robot's file: what it may say, what it comes to, and a drive from it with emulated devices."""
 
+import importlib
 import math
 import os
 import signal
 import socket
+import subprocess
+import sys
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from hardware import on_robot
+from hardware import doctor_robot, on_robot
 from hardware.base import Odometry
 from hardware.base_kinds import KINDS
 from hardware.button_device import DOWN, EVENT, KEY, pressed
@@ -18,6 +21,7 @@ from hardware.child import ended, started
 from hardware.complaints import advice
 from hardware.config import FIELD_OF_VIEW, MARGINS
 from hardware.config_file import read_config
+from hardware.doctor_finding import OK
 from hardware.emulated_lidar import EmulatedLidar, Track
 from hardware.emulated_process import EmulatedConfig
 from hardware.executor import LATCH
@@ -221,6 +225,33 @@ def test_emulated_devices_are_told_all_in_one_text(tmp_path):
     assert EmulatedConfig.from_json(told.to_json()) == told
     with pytest.raises(ValueError, match="configuration"):
         EmulatedConfig.from_json("{}")
+
+
+def test_a_base_of_another_process_is_asked_where_it_stands(tmp_path):
+    address = tmp_path / "own" / "base"
+    example = EXAMPLES / "serve_base.py"
+    process = subprocess.Popen(
+        [sys.executable, str(example), str(address)],
+        stdout=subprocess.PIPE,
+        env={**os.environ, "PYTHONPATH": str(EXAMPLES.parents[1])},
+    )
+    try:
+        assert process.stdout.readline() == f"serving {address}\n".encode()
+        path = changed(tmp_path, "/run/passpmp-base/base", str(address))
+        found = doctor_robot.base(read_config(path), served(path))
+        assert found.level == OK, found
+        assert str(address) in found.told
+    finally:
+        process.send_signal(signal.SIGINT)
+        process.wait(5.0)
+    assert not address.exists()
+
+
+def served(path):
+    """What the executor would drive."""
+    config = read_config(path)
+    module, name = config.base.made_by.build.split(":")
+    return getattr(importlib.import_module(module), name)(**config.base_options())
 
 
 def test_each_trouble_of_a_range_finder_has_something_to_look_at():
