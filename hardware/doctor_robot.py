@@ -16,11 +16,12 @@ import numpy as np
 
 from hardware.base import Base
 from hardware.complaints import advice
-from hardware.config import DriveConfig, Lidar
+from hardware.config import DriveConfig
+from hardware.config_parts import Lidar
+from hardware.devices import devices
 from hardware.doctor_finding import FAIL, OK, WARN, Finding
 from hardware.executor_process import check_private
 from hardware.letterbox import LONGEST_NAME
-from hardware.on_robot import devices
 from hardware.scip_client import ScipClient
 from hardware.scip_settings import ScipSettings
 

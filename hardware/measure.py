@@ -24,9 +24,9 @@ import numpy as np
 from hardware.base import Base, Odometry
 from hardware.config import DriveConfig
 from hardware.config_file import read_config
+from hardware.devices import devices
 from hardware.doctor_robot import busy
 from hardware.margins import deceleration
-from hardware.on_robot import devices
 
 TICK = 0.01
 """From one order to the next [s]."""

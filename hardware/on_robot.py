@@ -4,14 +4,10 @@ from __future__ import annotations
 
 import json
 import math
-import signal
 import time
 from collections import Counter
-from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
-from dataclasses import asdict, dataclass, replace
-from types import FrameType
-from typing import Any
+from collections.abc import Callable
+from contextlib import ExitStack
 
 import numpy as np
 
@@ -20,13 +16,14 @@ from hardware.chain import PlannerLoop, Round, poser
 from hardware.child import ended, started
 from hardware.complaints import advice
 from hardware.config import DriveConfig
-from hardware.emulated_process import BASE, EmulatedConfig, EmulatedProcess
+from hardware.devices import devices
+from hardware.driven import Driven, Look
 from hardware.executor_process import ExecutorConfig, ExecutorProcess, check_private
+from hardware.interrupts import Interrupts, interrupts
 from hardware.link import PlannerLink
 from hardware.scip_client import ScipClient, wait
 from hardware.scip_session import Unfit
-from hardware.scip_settings import ScipSettings
-from hardware.status import State, Status
+from hardware.status import State
 from hardware.stop_button import StopButton
 from passpmp_ti.grid.static_map import StaticMap
 from passpmp_ti.planner.navigator import Navigator
@@ -43,135 +40,6 @@ LONGEST_REST = 20.0
 
 STANDS = (State.RESTING, State.STOPPED, State.EMERGENCY)
 """What an executor does with a robot that has come to rest, or is told to by nobody else."""
-
-
-@dataclass(frozen=True, slots=True)
-class Look:
-    """How it goes."""
-
-    time: float
-    """Since the drive began [s]."""
-    record: Any
-    """The navigator's last."""
-    away: float
-    """From the goal, by what is known [m]."""
-    speed: float
-    """[m/s]."""
-    status: Status | None
-    """The executor's."""
-    silent: tuple[str, ...]
-    """Range finders that are not heard, and why."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Driven:
-    """What a drive came to."""
-
-    name: str
-    reached: bool
-    interrupted: bool
-    """By Ctrl-C."""
-    why: str
-    """Why it ended."""
-    seconds: float
-    cycle: float
-    rounds: int
-    """Cycles."""
-    idle: int
-    """Those without a scan or a known pose, or while the robot braked."""
-    sent: int
-    """Trajectories."""
-    refused: int
-    """Of those that the executor judged."""
-    took: np.ndarray
-    """From a scan's arrival to the planner's answer, sent, each [s]."""
-    decisions: dict[str, int]
-    worst_error: float
-    """Farthest off its path, as the executor measured it [m]."""
-    lost: dict[str, int]
-    """Links lost, of each range finder."""
-
-    def summary(self) -> dict[str, Any]:
-        """In numbers, SI units."""
-        told: dict[str, Any] = {
-            key: getattr(self, key)
-            for key in (
-                "name", "reached", "interrupted", "why", "seconds", "cycle", "rounds", "idle",
-                "sent", "refused", "decisions", "lost",
-            )
-        }  # fmt: skip
-        told["worst_error"] = None if math.isnan(self.worst_error) else self.worst_error
-        for key, share in (("median", 0.5), ("p99", 0.99)):
-            told[f"took_{key}"] = float(np.quantile(self.took, share)) if len(self.took) else None
-        return told
-
-
-class Interrupts:
-    """Counts Ctrl-C (and SIGTERM) instead of dying of it."""
-
-    def __init__(self) -> None:
-        self.count = 0
-
-    def hear(self, number: int, frame: FrameType | None) -> None:
-        """One more."""
-        self.count += 1
-
-
-@contextmanager
-def interrupts() -> Iterator[Interrupts]:
-    """While this is open, Ctrl-C ends nothing by itself."""
-    heard = Interrupts()
-    before = {n: signal.signal(n, heard.hear) for n in (signal.SIGINT, signal.SIGTERM)}
-    try:
-        yield heard
-    finally:
-        for number, old in before.items():
-            signal.signal(number, old)
-
-
-@contextmanager
-def devices(config: DriveConfig) -> Iterator[tuple[list[ScipSettings], str, dict[str, Any]]]:
-    """Settings of the range finders, what makes the base, and what that is called with. Those that
-    are emulated live while this is open.
-
-    Raises:
-        RuntimeError: emulated ones do not start.
-    """
-    if config.emulated is None:
-        real = [
-            replace(lidar.scip, straighten=config.looks_all_round)
-            for lidar in config.lidars
-            if lidar.scip is not None
-        ]
-        yield real, config.base.made_by.build, config.base_options()
-        return
-    process = EmulatedProcess(
-        EmulatedConfig(
-            directory=config.directory,
-            scenario=config.emulated.scenario,
-            seed=config.emulated.seed,
-            mounts=tuple(lidar.mount for lidar in config.lidars),
-            # errors are cut at three deviations: what is declared holds
-            noise=min(lidar.range_noise for lidar in config.lidars) / 3.0,
-            limits=config.limits,
-        )
-    )
-    try:
-        emulated = [
-            ScipSettings(
-                host="127.0.0.1",
-                port=port,
-                range_max=lidar.range_max,
-                straighten=config.looks_all_round,
-            )
-            for port, lidar in zip(process.ports, config.lidars, strict=True)
-        ]
-        address = str(config.directory / BASE)
-        yield (
-            emulated, "hardware.base_link:build", {"address": address, **asdict(config.limits)},
-        )  # fmt: skip
-    finally:
-        process.close()
 
 
 class RobotDrive:
@@ -384,38 +252,6 @@ class RobotDrive:
             status=status,
             silent=self._silent(),
         )
-
-
-def line(look: Look) -> str:
-    """One line of progress, and one for each range finder that is silent."""
-    state = "silent" if look.status is None else look.status.state.name.lower()
-    told = (
-        f"t {look.time:6.1f} s   to goal {look.away:6.1f} m   speed {look.speed:6.2f} m/s  "
-        f" {look.record.decision:<8} {state:<12} {look.record.reason}"
-    )
-    return "\n".join([told.rstrip(), *look.silent])
-
-
-def report(told: dict[str, Any]) -> str:
-    """A drive's summary as text."""
-    took = [told[f"took_{share}"] for share in ("median", "p99")]
-    decisions = ", ".join(f"{name} {n}" for name, n in sorted(told["decisions"].items())) or "none"
-    error = told["worst_error"]
-    lost = ", ".join(f"{name} {n}" for name, n in told["lost"].items())
-    return (
-        f"\n{told['name']}: {told['why']}, after {told['seconds']:.1f} s\n"
-        f"cycles of {told['cycle']:g} s: {told['rounds']}, {told['idle']} of them without a scan or"
-        f" a known pose; decisions: {decisions}\n"
-        "scan's arrival to new trajectory: "
-        + (
-            "none"
-            if None in took
-            else f"median {1e3 * took[0]:.1f} ms, 99 % {1e3 * took[1]:.1f} ms"
-        )
-        + f"\ntrajectories: {told['sent']} sent, {told['refused']} refused; off its path by"
-        f" {'?' if error is None else f'{1e3 * error:.0f}'} mm at the most\n"
-        f"links lost: {lost}"
-    )
 
 
 def _known(config: DriveConfig) -> StaticMap | None:

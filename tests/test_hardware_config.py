@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 from hardware import doctor_robot, on_robot
+from hardware import driven as driven_
 from hardware.base import Odometry
 from hardware.base_kinds import KINDS
 from hardware.button_device import DOWN, EVENT, KEY, pressed
@@ -295,7 +296,7 @@ def test_a_button_on_a_device_stops_the_robot(tmp_path):
 
 def emulated(tmp_path):
     config = read_config(EXAMPLES / "emulated.yaml")
-    small = config.planner.changed(capacity=400, particles=20, iterations=20)
+    small = config.planner.changed(capacity=300, particles=20, iterations=20, primitives=(0.4,))
     return replace(config, directory=tmp_path / "x", planner=small)
 
 
@@ -324,8 +325,8 @@ def test_ctrl_c_brings_the_robot_to_rest(tmp_path, monkeypatch):
     assert driven.sent > 0
     assert status.state is State.RESTING
     assert status.worst_error < 0.05
-    assert "interrupted" in on_robot.report(driven.summary())
-    assert on_robot.line(seen[0]).startswith("t ")
+    assert "interrupted" in driven_.report(driven.summary())
+    assert driven_.line(seen[0]).startswith("t ")
 
 
 @pytest.mark.campaign

@@ -159,7 +159,7 @@ def room(begin):
     [(None, OK, "UST-10LX"), ("drop", WARN, "fewer scans"), ("checksum", WARN, "cable")],
 )
 def test_a_range_finder_is_listened_to(fault, level, told, chair, monkeypatch):
-    monkeypatch.setattr(doctor_robot, "LISTEN", 0.6)
+    monkeypatch.setattr(doctor_robot, "LISTEN", 0.45)
     # a machine under load is no fault of the device's
     monkeypatch.setattr(doctor_robot, "SLOW", 0.75)
     made, swept = [], []
@@ -183,7 +183,7 @@ def test_a_range_finder_is_listened_to(fault, level, told, chair, monkeypatch):
 
 
 def test_a_range_finder_that_is_not_there_fails_with_what_to_look_at(chair, monkeypatch):
-    monkeypatch.setattr(doctor_robot, "LISTEN", 0.3)
+    monkeypatch.setattr(doctor_robot, "LISTEN", 0.2)
     with socket.socket() as nobody:
         nobody.bind(("127.0.0.1", 0))
         settings = ScipSettings(host="127.0.0.1", port=nobody.getsockname()[1])
@@ -222,7 +222,7 @@ class Standing:
     ],
 )
 def test_a_base_is_told_to_stand_and_asked_where(wrong, level, told, chair, monkeypatch):
-    monkeypatch.setattr(doctor_robot, "ASK", 0.15)
+    monkeypatch.setattr(doctor_robot, "ASK", 0.1)
     standing = Standing(**wrong)
     found = doctor_robot.base(chair, standing)
     assert found.level == level, found
