@@ -114,14 +114,20 @@ class DriveConfig:
     @property
     def heading_error(self) -> float:
         """Greatest error of a beam's heading [rad]: that of what is told, and what the robot turned
-        since that was measured."""
-        turn_rate = self.robot.top_turn_rate
-        # wheels may change faster than they surely brake: a measured distance has delays in it
-        change = 2.0 * BRISK * self.limits.acceleration / self.robot.track
-        since = self.base.odometry_period + HALF_SWEEP
-        error = self.measured.heading_error + 0.5 * change * since**2
+        otherwise than its wheels said since that was measured."""
+        error = self.measured.heading_error + 2.0 * self._unforeseen / self.robot.track
+        if self.looks_all_round:
+            return error
         # all beams have the heading of the sweep's middle where the field must stay the same
-        return error if self.looks_all_round else error + turn_rate * HALF_SWEEP
+        return error + self.robot.top_turn_rate * HALF_SWEEP
+
+    @property
+    def _unforeseen(self) -> float:
+        """What a wheel does otherwise than it did at the newest odometry, until the sweep's middle
+        or end [m]."""
+        # wheels may change faster than they surely brake: a measured distance has delays in it
+        change = BRISK * self.limits.acceleration
+        return 0.5 * change * (self.base.odometry_period + HALF_SWEEP) ** 2
 
     @property
     def planner_settings(self) -> Settings:
@@ -135,7 +141,7 @@ class DriveConfig:
             self.planner,
             self.executor_settings,
             cycle=self.planner.cycle,
-            localisation_error=m.localisation_error + turned,
+            localisation_error=m.localisation_error + self._unforeseen + turned,
             range_noise=max(lidar.range_noise for lidar in self.lidars),
             scan_age=self.scan_age,
             top_speed=max(robot.top_speed, out * robot.top_turn_rate),

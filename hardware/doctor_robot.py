@@ -8,9 +8,10 @@ import math
 import os
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -59,10 +60,23 @@ def robot(config: DriveConfig) -> Iterator[Finding]:
             with devices(elsewhere) as (settings, build, options):
                 for lidar, one in zip(config.lidars, settings, strict=True):
                     yield range_finder(lidar, one)
-                module, name = build.split(":")
-                yield base(config, getattr(importlib.import_module(module), name)(**options))
-        except (RuntimeError, ImportError, AttributeError, OSError) as cause:
-            yield Finding("devices", FAIL, str(cause), "see whether what it names is installed")
+                yield driven(config, build, options)
+        except RuntimeError as cause:
+            yield Finding("devices", FAIL, str(cause))
+
+
+def driven(config: DriveConfig, build: str, options: Mapping[str, Any]) -> Finding:
+    """A base that is made as the executor makes it, and asked."""
+    module, name = build.split(":")
+    try:
+        one: Base = getattr(importlib.import_module(module), name)(**options)
+    except (ValueError, OSError) as cause:
+        return Finding(f"base {config.base.kind}", FAIL, str(cause))
+    except (ImportError, AttributeError) as cause:
+        return Finding(
+            f"base {config.base.kind}", FAIL, str(cause), "install what this kind of base needs"
+        )
+    return base(config, one)
 
 
 def directory(path: Path) -> Finding:

@@ -39,7 +39,7 @@ LONGEST_REST = 20.0
 """[s] after which a robot that should have come to rest is stopped by the button."""
 
 STANDS = (State.RESTING, State.STOPPED, State.EMERGENCY)
-"""What an executor does with a robot that has come to rest, or is told to by nobody else."""
+"""States in which nothing that the executor holds moves the robot."""
 
 
 class RobotDrive:

@@ -231,6 +231,15 @@ def test_a_base_is_told_to_stand_and_asked_where(wrong, level, told, chair, monk
     assert standing.closed
 
 
+def test_a_base_that_cannot_be_made_is_a_finding(chair, tmp_path):
+    address = str(tmp_path / "nobody" / "base")
+    found = doctor_robot.driven(chair, chair.base.made_by.build, {"address": address})
+    assert found.level == FAIL
+    assert "serve_base.py" in found.told
+    missing = doctor_robot.driven(chair, "no_such_module:build", {})
+    assert (missing.level, missing.remedy) == (FAIL, "install what this kind of base needs")
+
+
 # speed -----------------------------------------------------------------------------------------
 
 
