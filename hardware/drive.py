@@ -116,12 +116,14 @@ def _on_twin(given: argparse.Namespace) -> int:
         raise ValueError(
             "--twin needs MuJoCo, which is not installed; pip install 'passpmp_ti[twin]'"
         )
-    _start(given.threads)
     from hardware.twin import Chain
 
     print("compiling, and starting the twin", file=sys.stderr)
     cycle = CYCLE if given.cycle is None else given.cycle
-    chain = Chain(given.twin, seed=given.seed, cycle=cycle, object_speed=given.object_speed)
+    chain = Chain(
+        given.twin, seed=given.seed, cycle=cycle, object_speed=given.object_speed,
+        threads=given.threads,
+    )  # fmt: skip
     seconds = chain.scenario.duration if given.seconds is None else given.seconds
     door.finite("drive", "seconds", seconds, above=0.0, unit="s")
     with chain:
@@ -153,9 +155,10 @@ def _write(out: str | None, told: dict[str, Any]) -> None:
 def line(look: Look) -> str:
     """One line of progress."""
     moving = sum(contact.moving for contact in look.contacts)
+    decision = "" if look.record is None else look.record.decision
     return (
         f"t {look.time:6.1f} s   to goal {look.away:6.1f} m   speed {look.speed:6.2f} m/s  "
-        f" {look.record.decision:<8} {look.state:<12} contacts moving {moving},"
+        f" {decision:<8} {look.state:<12} contacts moving {moving},"
         f" at rest {len(look.contacts) - moving}"
     )
 

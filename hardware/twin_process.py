@@ -36,6 +36,7 @@ from hardware.priority import put_forward
 from hardware.scip_device import Device
 from hardware.scip_emulator import Emulator
 from hardware.scip_rotor import Nature
+from hardware.twin_settings import on_chair
 from passpmp_ti import door
 from passpmp_ti.sim.scenario import Scenario, load_scenario
 
@@ -51,8 +52,6 @@ ROW = struct.Struct(f"<{len(Odometry._fields) + 2}d")
 """A row of the truth: the chair's, how far it leans [rad], and how late the twin is [s]."""
 BASE, TRUTH = "base", "truth"
 """Names of the base's socket and of the truth's file in the directory."""
-LIDAR_NOISE = 0.01
-"""Standard deviation of a range, cut at three of them [m]."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -92,9 +91,10 @@ class TwinConfig:
         """The scenario.
 
         Raises:
-            ValueError: there is none of that name, or something is wrong with it.
+            ValueError: there is none of that name, something is wrong with it, or no chair can
+                drive it.
         """
-        return load_scenario(self.scenario).changed(object_speed=self.object_speed)
+        return on_chair(load_scenario(self.scenario).changed(object_speed=self.object_speed))
 
     def nature(self) -> ChairNature:
         """The chair that this seed draws."""
@@ -217,7 +217,7 @@ def _emulated(
     rate = 1.0 + float(rng.uniform(-5e-5, 5e-5))
     start, uneven = int(rng.integers(1 << 24)), float(rng.uniform(-2e-3, 2e-3))
     nature = Nature(clock_start=start, clock_rate=rate, unevenness=uneven)
-    source = ChairLidar(chair, mount, rng, noise=LIDAR_NOISE)
+    source = ChairLidar(chair, mount, rng)
 
     def make(now: float, source: Callable[[float], np.ndarray] = source) -> Device:
         return Device(source, now, nature)
