@@ -25,6 +25,8 @@ from hardware.executor_process import ExecutorConfig, ExecutorProcess
 from hardware.status import State
 from hardware.twin_cycles import NOTHING, Cycle, CycleReader
 from hardware.twin_figures import Chained, chained, last_tick
+from hardware.twin_film import film
+from hardware.twin_picture import Picture
 from hardware.twin_planner import CYCLES, PlannerConfig, PlannerProcess, tell_ports
 from hardware.twin_process import BASE, TwinConfig, TwinProcess
 from hardware.twin_settings import executor_of, settings_of
@@ -223,6 +225,16 @@ class Chain:
         at = None if reached_at is None else reached_at + self.twin.begin
         episode = episode_of(self.drive, self.settings, self.seed, at, interrupted)
         return chained(episode, self.cycles, self.log, np.concatenate(self.rows), self.revived)
+
+    def film(self, path: Path) -> Path:
+        """Draw what was driven, once it is over. Returns what was written.
+
+        Raises:
+            RuntimeError: no video can be written here.
+        """
+        picture = Picture(self.scenario.name, self.world, self.robot)
+        truth = np.concatenate(self.rows)
+        return film(path, picture, truth, self.cycles, self.goals, self.twin.begin)
 
     def see(self) -> None:
         """Take note of what was done, and of what really happened, since."""

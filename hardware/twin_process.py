@@ -101,6 +101,24 @@ class TwinConfig:
         return ChairNature.drawn(np.random.default_rng([self.seed, 2]))
 
 
+class TruthReader:
+    """Reads what a twin writes down."""
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self._read = 0
+
+    def new(self) -> np.ndarray:
+        """[n, 8] what really was since the last call: stamp, x, y, theta, right and left over
+        ground, lean, lateness."""
+        with self._path.open("rb") as file:
+            file.seek(self._read)
+            data = file.read()
+        whole = len(data) // ROW.size * ROW.size
+        self._read += whole
+        return np.frombuffer(data[:whole], dtype="<f8").reshape(-1, ROW.size // 8)
+
+
 class TwinProcess:
     """Starts a twin and looks after it."""
 
@@ -115,8 +133,7 @@ class TwinProcess:
         """
         home = str(Path(__file__).parents[1])
         paths = [home, *filter(None, [os.environ.get("PYTHONPATH")])]
-        self._truth = config.directory / TRUTH
-        self._read = 0
+        self._truth = TruthReader(config.directory / TRUTH)
         self.process = subprocess.Popen(
             [sys.executable, "-m", "hardware.twin_process", config.to_json()],
             stdin=subprocess.DEVNULL,
@@ -143,14 +160,8 @@ class TwinProcess:
         """The world's time is this much ahead of the clock's [s]."""
 
     def truth(self) -> np.ndarray:
-        """[n, 8] what really was since the last call: stamp, x, y, theta, right and left over
-        ground, lean, lateness."""
-        with self._truth.open("rb") as file:
-            file.seek(self._read)
-            data = file.read()
-        whole = len(data) // ROW.size * ROW.size
-        self._read += whole
-        return np.frombuffer(data[:whole], dtype="<f8").reshape(-1, ROW.size // 8)
+        """[n, 8] what really was since the last call, as `TruthReader.new`."""
+        return self._truth.new()
 
     def close(self, within: float = 10.0) -> str:
         """End it. Returns what it complained of."""
