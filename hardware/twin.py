@@ -75,6 +75,7 @@ class Chain:
         object_speed: float | None = None,
         threads: int | None = None,
         goals: tuple[tuple[float, float], ...] | None = None,
+        ahead: float = 0.0,
         obeys: bool = False,
     ) -> None:
         """
@@ -87,6 +88,7 @@ class Chain:
                 the scenario's.
             threads: of the planner's kernels; None: one for each core.
             goals: to be reached one after the other [m]; None: the scenario's.
+            ahead: the scenario has gone on for so long when the chair begins [s].
             obeys: whether twin and planner can be told to go wrong.
 
         Raises:
@@ -94,8 +96,9 @@ class Chain:
         """
         directory = Path(tempfile.mkdtemp(prefix="twin-"))
         self.config = TwinConfig(
-            directory=directory, scenario=scenario, seed=seed, object_speed=object_speed
-        )
+            directory=directory, scenario=scenario, seed=seed, object_speed=object_speed,
+            ahead=ahead, obeys=obeys,
+        )  # fmt: skip
         self.directory, self.scenario, self.seed = directory, self.config.load(), seed
         robot = self.scenario.robot
         assert isinstance(robot, DifferentialDrive)  # or it would not have been loaded

@@ -15,7 +15,7 @@ from hardware.chain import Sent
 from hardware.executor import Tick
 from hardware.executor_process import ROW
 from hardware.scip_receiver import Counters
-from hardware.status import State
+from hardware.status import Reason, State
 from hardware.twin_cycles import Cycle
 from passpmp_ti.sim.episode import Episode
 
@@ -54,6 +54,8 @@ class Chained:
     """Planners that had died and were started again."""
     executor_states: dict[str, float]
     """Share of time that the executor spent in each state."""
+    stops: dict[str, int]
+    """How often it left what it held and braked, by the reason."""
     lidars: tuple[Counters, ...]
 
     def summary(self) -> dict[str, Any]:
@@ -71,7 +73,9 @@ class Chained:
             "sent": len(self.to_trajectory), "refused": self.refused, "idle": self.idle,
             "worst_error": self.worst_error, "worst_lean": self.worst_lean,
             "twin_late": self.twin_late, "twin_latest": self.twin_latest,
-            "revived": self.revived, "executor_states": self.executor_states,
+            "revived": self.revived, "executor_states": self.executor_states, "stops": self.stops,
+            "rests_at_last": bool(self.episode.scenario.robot.at_rest(self.episode.states[-1])),
+            "longest_stand": longest_stand(self.episode),
         }  # fmt: skip
 
 
@@ -103,6 +107,7 @@ def chained(
         twin_latest=float(truth[:, 7].max()),
         revived=revived,
         executor_states=shares(ticks),
+        stops=stops(ticks),
         lidars=next((c.lidars for c in reversed(cycles) if c.lidars), ()),
     )
 
@@ -157,3 +162,18 @@ def shares(ticks: Sequence[Tick]) -> dict[str, float]:
     """Share of ticks in each state of the executor."""
     counts = Counter(State(int(tick.state)).name.lower() for tick in ticks)
     return {name: count / len(ticks) for name, count in counts.items()}
+
+
+def stops(ticks: Sequence[Tick]) -> dict[str, int]:
+    """How often an executor began to brake off what it held, by the reason."""
+    braking = np.array([tick.state == State.BRAKING for tick in ticks], dtype=bool)
+    begun = np.flatnonzero(braking[1:] & ~braking[:-1]) + 1
+    return dict(Counter(Reason(int(ticks[int(n)].reason)).name.lower() for n in begun))
+
+
+def longest_stand(episode: Episode) -> float:
+    """The longest time at rest between the first motion and the last [s]."""
+    moves = np.flatnonzero(~episode.scenario.robot.at_rest(episode.states))
+    if not len(moves):
+        return 0.0
+    return float(np.diff(episode.times[moves]).max(initial=0.0))

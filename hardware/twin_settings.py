@@ -30,8 +30,9 @@ REST_LATE = 0.06
 """It rests this long after its path, or is stopped [s]: 40 ms in an ordinary drive."""
 LEAN = 0.005
 """What a chair that leans as it brakes and turns adds to a range [m]."""
-FROZEN_AFTER = 3
-"""Sweeps with the very same distances from which on a lidar is not believed: it has noise."""
+FROZEN_AFTER = 1
+"""Sweeps that tell the very same distances as those before and are still not believed, from the
+first: a lidar has noise."""
 
 
 def on_chair(scenario: Scenario) -> Scenario:
