@@ -160,7 +160,8 @@ def main() -> int:
 
     def each(left: list[Job]) -> Generator[Result, None, None]:
         for job in left:
-            filmed = given.out / f"fig{job.experiment.figure}-{job.experiment.cycle:g}"
+            e = job.experiment
+            filmed = given.out / f"fig{e.figure}-{round(1e3 * e.cycle)}ms.mp4"
             found = carry_out(job, filmed if given.film and job.seed == 0 else None)
             print(line(found), file=sys.stderr)
             yield found

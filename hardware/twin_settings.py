@@ -74,7 +74,9 @@ def settings_of(scenario: Scenario, world: World, cycle: float, nature: ChairNat
     """
     slimmest = min([SLIMMEST, *world.movers.radius.tolist()])
     return with_margins(
-        scenario.settings.changed(cell=CELL, object_radius=slimmest),
+        scenario.settings.changed(
+            cell=CELL, object_radius=slimmest, cruise_speed=scenario.robot.top_speed
+        ),
         executor_of(cycle),
         cycle=cycle,
         localisation_error=nature.localisation_error,

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from hardware.letterbox import Letterbox
 from hardware.link import PlannerLink
+from hardware.status import Status
 from passpmp_ti.trajectory import Trajectory
 
 ORDERS = "planner-orders"
@@ -32,8 +33,13 @@ class WrongLink(PlannerLink):
         self._orders = Letterbox(orders)
         super().__init__(directory, track=track, clock=self._now)
 
+    def poll(self, timeout: float = 0.0) -> Status | None:
+        # whatever is wrong, every cycle asks how it goes
+        for order, _ in self._orders.collect():
+            self._wrong = order.decode()
+        return super().poll(timeout)
+
     def offer(self, trajectory: Trajectory) -> bool:
-        self._obey()
         if self._wrong == "nan":
             states = trajectory.states.copy()
             states[len(states) // 2, 3] = math.nan
@@ -41,17 +47,12 @@ class WrongLink(PlannerLink):
         return super().offer(trajectory)
 
     def beat(self, scan_stamp: float | None = None) -> None:
-        self._obey()
         off = STEP if self._wrong == "clock" else 0.0
         super().beat(None if scan_stamp is None else scan_stamp + off)
 
     def close(self) -> None:
         super().close()
         self._orders.close()
-
-    def _obey(self) -> None:
-        for order, _ in self._orders.collect():
-            self._wrong = order.decode()
 
     def _now(self) -> float:
         return time.monotonic() + (STEP if self._wrong == "clock" else 0.0)
