@@ -49,8 +49,8 @@ late at rest, or moved while the fault lasted, or did not drive again once it wa
 """
 DISTURBED = (
     f"A drive in which the twin itself was late by more than {1e3 * LATE:.0f} ms at any moment is"
-    f" disturbed: it is driven again, up to {TRIES} drives in all, and the last one counts. Contacts"
-    " of those before are counted as well."
+    f" disturbed: it is driven again, up to {TRIES} drives in all, and the last one counts."
+    " Contacts of those before are counted as well."
 )
 
 
