@@ -15,11 +15,12 @@ from typing import TYPE_CHECKING, Any
 from passpmp_ti import door
 
 if TYPE_CHECKING:
-    from hardware.twin import Look
+    from hardware.twin import Chain, Look
+    from hardware.twin_view import View
 
 EXAMPLE = """passpmp drive hardware/examples/emulated.yaml
   passpmp drive --twin corridor_person --cycle 0.1
-  passpmp drive --twin dead_end --seed 3 --seconds 60 --out out/dead_end.json"""
+  passpmp drive --twin dead_end --seed 3 --video out/dead_end.mp4 --live out/live"""
 FAILED, INTERRUPTED = 1, 130
 """Exit codes: something touched the twin while it moved, or a robot did not get to its goal;
 Ctrl-C."""
@@ -61,6 +62,13 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     )
     add("--threads", type=int, metavar="K", help="of the planner's kernels (default: all cores)")
     add("--out", metavar="FILE", help="write the summary here, as JSON")
+    add("--video", metavar="FILE", help="with --twin: draw the drive when it is over")
+    add(
+        "--live",
+        metavar="FOLDER",
+        help="with --twin: show it as it goes, in a window, or where there is none as"
+        " FOLDER/live.png",
+    )
 
 
 def run(given: argparse.Namespace) -> int:
@@ -78,6 +86,9 @@ def run(given: argparse.Namespace) -> int:
 
 
 def _on_robot(given: argparse.Namespace) -> int:
+    for option in ("video", "live"):
+        if getattr(given, option) is not None:
+            raise ValueError(f"--{option} goes with --twin: only there it is known what really was")
     for option in ("cycle", "object_speed"):
         if getattr(given, option) is not None:
             raise ValueError(
@@ -116,22 +127,37 @@ def _on_twin(given: argparse.Namespace) -> int:
         raise ValueError(
             "--twin needs MuJoCo, which is not installed; pip install 'passpmp_ti[twin]'"
         )
-    _start(given.threads)
     from hardware.twin import Chain
 
     print("compiling, and starting the twin", file=sys.stderr)
     cycle = CYCLE if given.cycle is None else given.cycle
-    chain = Chain(given.twin, seed=given.seed, cycle=cycle, object_speed=given.object_speed)
+    chain = Chain(
+        given.twin, seed=given.seed, cycle=cycle, object_speed=given.object_speed,
+        threads=given.threads,
+    )  # fmt: skip
     seconds = chain.scenario.duration if given.seconds is None else given.seconds
     door.finite("drive", "seconds", seconds, above=0.0, unit="s")
-    with chain:
+    with contextlib.ExitStack() as open_:
+        open_.enter_context(chain)
+        if given.live is not None:
+            open_.callback(_shown(chain, given.live).close)
         found = chain.run(seconds, lambda look: print(line(look), file=sys.stderr))
     told = found.summary()
     print(report(told))
     _write(given.out, told)
+    if given.video is not None:
+        print(f"written to {chain.film(Path(given.video))}")
     if told["interrupted"]:
         return INTERRUPTED
     return FAILED if told["collisions_moving"] else 0
+
+
+def _shown(chain: Chain, folder: str) -> View:
+    from hardware.twin_view import View, ViewConfig
+
+    view = View(ViewConfig(twin=chain.config, begin=chain.twin.begin, folder=folder))
+    print(f"shown in {view.where}", file=sys.stderr)
+    return view
 
 
 def _start(threads: int | None) -> None:
@@ -153,9 +179,10 @@ def _write(out: str | None, told: dict[str, Any]) -> None:
 def line(look: Look) -> str:
     """One line of progress."""
     moving = sum(contact.moving for contact in look.contacts)
+    decision = "" if look.record is None else look.record.decision
     return (
         f"t {look.time:6.1f} s   to goal {look.away:6.1f} m   speed {look.speed:6.2f} m/s  "
-        f" {look.record.decision:<8} {look.state:<12} contacts moving {moving},"
+        f" {decision:<8} {look.state:<12} contacts moving {moving},"
         f" at rest {len(look.contacts) - moving}"
     )
 
