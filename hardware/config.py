@@ -113,13 +113,9 @@ class DriveConfig:
 
     @property
     def heading_error(self) -> float:
-        """Greatest error of a beam's heading [rad]: that of what is told, and what the robot turned
-        otherwise than its wheels said since that was measured."""
-        error = self.measured.heading_error + 2.0 * self._unforeseen / self.robot.track
-        if self.looks_all_round:
-            return error
-        # all beams have the heading of the sweep's middle where the field must stay the same
-        return error + self.robot.top_turn_rate * HALF_SWEEP
+        """Greatest error of a range finder's heading [rad]: that of what is told, and what the
+        robot turned otherwise than its wheels said since."""
+        return self.measured.heading_error + 2.0 * self._unforeseen / self.robot.track
 
     @property
     def _unforeseen(self) -> float:
@@ -131,20 +127,17 @@ class DriveConfig:
 
     @property
     def planner_settings(self) -> Settings:
-        """The planner's, with the margins of what was measured."""
-        m, robot = self.measured, self.robot
-        # a heading that is off moves what is far away the most
-        turned = self.heading_error * max(lidar.range_max for lidar in self.lidars)
-        # what sits far out swings faster than the robot drives
-        out = max(math.hypot(*lidar.mount[:2]) for lidar in self.lidars)
+        """The planner's, with the margins of what was measured. What the robot moves and turns in a
+        sweep, and the error of its heading, is taken from the scans themselves (`steady.py`)."""
+        m = self.measured
         return with_margins(
             self.planner,
             self.executor_settings,
             cycle=self.planner.cycle,
-            localisation_error=m.localisation_error + self._unforeseen + turned,
+            localisation_error=m.localisation_error + self._unforeseen,
             range_noise=max(lidar.range_noise for lidar in self.lidars),
             scan_age=self.scan_age,
-            top_speed=max(robot.top_speed, out * robot.top_turn_rate),
+            top_speed=0.0,
         )
 
     def base_options(self) -> dict[str, Any]:

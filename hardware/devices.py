@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from typing import Any
 
 from hardware.config import DriveConfig
@@ -21,11 +21,7 @@ def devices(config: DriveConfig) -> Iterator[tuple[list[ScipSettings], str, dict
         RuntimeError: emulated ones do not start.
     """
     if config.emulated is None:
-        real = [
-            replace(lidar.scip, straighten=config.looks_all_round)
-            for lidar in config.lidars
-            if lidar.scip is not None
-        ]
+        real = [lidar.scip for lidar in config.lidars if lidar.scip is not None]
         yield real, config.base.made_by.build, config.base_options()
         return
     process = EmulatedProcess(
@@ -41,12 +37,7 @@ def devices(config: DriveConfig) -> Iterator[tuple[list[ScipSettings], str, dict
     )
     try:
         emulated = [
-            ScipSettings(
-                host="127.0.0.1",
-                port=port,
-                range_max=lidar.range_max,
-                straighten=config.looks_all_round,
-            )
+            ScipSettings(host="127.0.0.1", port=port, range_max=lidar.range_max)
             for port, lidar in zip(process.ports, config.lidars, strict=True)
         ]
         address = str(config.directory / BASE)

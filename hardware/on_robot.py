@@ -21,9 +21,10 @@ from hardware.driven import Driven, Look
 from hardware.executor_process import ExecutorConfig, ExecutorProcess, check_private
 from hardware.interrupts import Interrupts, interrupts
 from hardware.link import PlannerLink
-from hardware.scip_client import ScipClient, wait
+from hardware.scip_client import wait
 from hardware.scip_session import Unfit
 from hardware.status import State
+from hardware.steady import SteadyClient
 from hardware.stop_button import StopButton
 from passpmp_ti.grid.static_map import StaticMap
 from passpmp_ti.planner.navigator import Navigator
@@ -95,7 +96,16 @@ class RobotDrive:
                     raise RuntimeError(f"the stop button did not start: {said!r}")
             self.link = open_.enter_context(PlannerLink(config.directory, track=config.robot.track))
             self.clients = [
-                open_.enter_context(ScipClient(one, pose_at=poser(self.link, lidar.pose)))
+                open_.enter_context(
+                    SteadyClient(
+                        one,
+                        state_at=self.link.state_at,
+                        pose_at=poser(self.link, lidar.pose),
+                        track=config.robot.track,
+                        arm=math.hypot(*lidar.mount[:2]),
+                        heading_error=config.heading_error,
+                    )
+                )
                 for one, lidar in zip(settings, config.lidars, strict=True)
             ]
             self._await_devices()

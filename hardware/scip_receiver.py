@@ -17,9 +17,6 @@ from passpmp_ti.scan import Scan
 UNEVEN = 0.01
 """Relative error of a device's speed of turning: a UST was seen to turn 0.2 % slower than told."""
 
-MOST_TURN = 0.5
-"""[rad] by which a sensor turns in a sweep at the most: poses that say more are wrong."""
-
 Pose = tuple[float, float, float]
 
 
@@ -154,8 +151,7 @@ class Receiver:
         return most > 0 and self._same_in_row >= most
 
     def _scan(self, sweep: Sweep, begin: float, end: float) -> Scan | None:
-        """None where it is not known from where, or the sensor is said to turn as no robot does,
-        or by so much that its beams would go more than once round."""
+        """None where it is not known from where."""
         settings, command, parameters = self._settings, self._command, self._parameters
         ranges = ranges_of(sweep.distances, parameters, settings.codes, settings.range_max)
         # a value stands for the middle of the steps that share it
@@ -163,26 +159,15 @@ class Receiver:
         low = parameters.angle(command.start + middle)
         high = parameters.angle(command.end - middle)
         if settings.upside_down:
-            ranges, low, high = ranges[::-1], -high, -low
+            ranges, low = ranges[::-1], -high
         # halfway through the sweep it is off by the least
         pose = (0.0, 0.0, 0.0) if self._pose_at is None else self._pose_at(0.5 * (begin + end))
         if not all(map(math.isfinite, pose)):
             return None
-        increment = parameters.angle(command.cluster) - parameters.angle(0)
-        if settings.straighten and self._pose_at is not None:
-            before, after = self._pose_at(begin), self._pose_at(end)
-            if settings.upside_down:
-                before, after = after, before
-            turns = [math.remainder(one[2] - pose[2], math.tau) for one in (before, after)]
-            low, high = low + turns[0], high + turns[1]
-            # a number that is none is no turn either
-            if not (max(map(abs, turns)) <= MOST_TURN and high - low <= math.tau):
-                return None
-            increment = (high - low) / (len(ranges) - 1)
         return Scan(
             ranges,
             angle_min=low,
-            angle_increment=increment,
+            angle_increment=parameters.angle(command.cluster) - parameters.angle(0),
             range_max=settings.range_max,
             pose=pose,
             stamp=end,

@@ -39,10 +39,6 @@ class ScipSettings:
     """What numbers that are no distances mean."""
     upside_down: bool = False
     """Mounted on its head: it counts clockwise then, seen from above."""
-    straighten: bool = False
-    """Each beam gets the heading that the sensor had when it was measured, as if it had turned
-    evenly; else all get that of the sweep's middle. A scan's field of view then differs from sweep
-    to sweep, so a robot with blind sectors that have a bound of their own holds while it turns."""
 
     # time
     stamp_error: float = 0.03
