@@ -18,12 +18,12 @@ from passpmp_ti import kernel_cache, probe
 
 EXTRAS = {
     "twin": (("mujoco",), "pip install 'passpmp_ti[twin]' for drive --twin"),
-    "bags": (("rosbags",), "pip install rosbags for recordings of ROS"),
+    "bags": (("rosbags",), "pip install 'passpmp_ti[bags]' for recordings of ROS"),
     "ros": (
         ("rospy", "sensor_msgs", "tf2_ros"),
         "on Debian: apt-get install python3-rospy python3-sensor-msgs python3-tf2-ros; for ROS 1",
     ),
-    "ros2": (("cyclonedds",), "pip install cyclonedds for the topics of ROS 2"),
+    "ros2": (("cyclonedds",), "pip install 'passpmp_ti[ros2]' for the topics of ROS 2"),
     "cluster": (("dask", "distributed"), "pip install 'passpmp_ti[cluster]' for compare on many"),
     "bench": (("numba",), "pip install 'passpmp_ti[bench]' to compare kernels with Numba"),
 }
