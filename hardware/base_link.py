@@ -14,8 +14,9 @@ from hardware.messages import Body, Drive, Message, MessageError, Reset, Stop, d
 class BaseServer:
     """Lets one executor at a time drive a base. Its owner calls `step` often.
 
-    A command that lay about for as long as the base would have waited for it is no command any
-    more: a base that was asleep does not start with what it was told before.
+    A command holds from when it was sent: one that lay about is not obeyed for the whole of the
+    base's time-out once more. When the newest is that old, the base is told to stop, and nothing
+    but a fresh command lets it go.
     """
 
     def __init__(
@@ -34,6 +35,8 @@ class BaseServer:
         self._driver = ""
         self._sent = 0
         self._told: Odometry | None = None
+        self._obeyed: float | None = None  # when what is obeyed was sent
+        self._held_up = False  # stopped because nothing fresh came, not because somebody said so
         self.garbled = 0
         """Messages that could not be read."""
 
@@ -50,6 +53,9 @@ class BaseServer:
                 self.garbled += 1
                 continue
             self._hear(message, sender)
+        if self._obeyed is not None and self._old(self._obeyed):
+            self._base.stop()
+            self._obeyed, self._held_up = None, True
         odometry = self._base.odometry()
         if odometry is not None and odometry is not self._told and self._driver:
             self._told = odometry
@@ -67,17 +73,27 @@ class BaseServer:
         if isinstance(body, Stop):
             # whoever says so
             self._base.stop()
+            self._obeyed, self._held_up = None, False
             return
         if not isinstance(body, (Drive, Reset)) or message.session < self._session:
             return
         self._session, self._driver = message.session, sender
-        now = self._clock()
-        if not now - self._base.limits.command_timeout <= message.sent_at:
+        if self._old(message.sent_at):
             return
         if isinstance(body, Drive):
+            if self._held_up:
+                self._base.reset()
+                self._held_up = False
+            # of another clock's future it is no fresher than now
+            self._obeyed = min(message.sent_at, self._clock())
             self._base.drive(body.right, body.left)
         elif isinstance(body, Reset):
             self._base.reset()
+            self._held_up = False
+
+    def _old(self, sent_at: float) -> bool:
+        # a number that is none is no fresh one
+        return not self._clock() - self._base.limits.command_timeout <= sent_at
 
 
 class RemoteBase:
@@ -141,6 +157,12 @@ def build(*, address: str, **limits: float) -> RemoteBase:
     """A remote base from plain values, as a configuration has them.
 
     Raises:
-        ValueError: a number out of its range.
+        ValueError: a number out of its range, or no directory where the server's socket should be.
     """
-    return RemoteBase(Path(address), BaseLimits(**limits))
+    here = Path(address)
+    if not here.parent.is_dir():
+        raise ValueError(
+            f"base.address = {address}: there is no {here.parent}; start what serves the base"
+            " first, as hardware/examples/serve_base.py does"
+        )
+    return RemoteBase(here, BaseLimits(**limits))

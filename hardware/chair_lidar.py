@@ -18,6 +18,8 @@ from hardware.mujoco_chair import MujocoChair
 from hardware.scip_sweep import UST_10LX, Parameters
 from passpmp_ti import door
 
+LIDAR_NOISE = 0.01
+"""Standard deviation of a range, cut at three of them [m]."""
 SLICES = 18
 """Of a sweep; the chair and all people stand still for each, 1.04 ms of a UST-10LX's 18.75."""
 
@@ -35,7 +37,7 @@ class ChairLidar:
         mount: tuple[float, float, float],
         rng: np.random.Generator,
         *,
-        noise: float = 0.01,
+        noise: float = LIDAR_NOISE,
         parameters: Parameters = UST_10LX,
     ) -> None:
         """

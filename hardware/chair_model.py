@@ -85,6 +85,11 @@ class ChairNature:
         """Bound on the error of a told place [m]: `Settings.localisation_error` holds it."""
         return 3.0 * math.sqrt(2.0) * self.pose_noise
 
+    @property
+    def heading_error(self) -> float:
+        """Bound on the error of a told heading [rad]."""
+        return 3.0 * self.heading_noise
+
     @classmethod
     def drawn(cls, rng: np.random.Generator) -> ChairNature:
         """A chair as one of many: load, tyres, floor and sensors as they may be."""

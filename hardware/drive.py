@@ -7,21 +7,27 @@ import contextlib
 import importlib.util
 import io
 import json
+import math
 import sys
-import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from passpmp_ti import door
 
 if TYPE_CHECKING:
-    from hardware.twin import Look
+    from hardware.twin import Chain, Look
+    from hardware.twin_view import View
 
-EXAMPLE = """passpmp drive --twin corridor_person --cycle 0.1
-  passpmp drive --twin dead_end --seed 3 --seconds 60 --out out/dead_end.json
-  passpmp drive --twin corridor_person --bag out/drive.bag"""
+EXAMPLE = """passpmp drive hardware/examples/emulated.yaml
+  passpmp drive --twin corridor_person --cycle 0.1
+  passpmp drive --twin dead_end --seed 3 --video out/dead_end.mp4 --live out/live"""
 FAILED, INTERRUPTED = 1, 130
-"""Exit codes: something touched the robot while it moved, Ctrl-C."""
+"""Exit codes: something touched the twin while it moved, or a robot did not get to its goal;
+Ctrl-C."""
+PRIORITY = 1
+"""Of the planner, of SCHED_FIFO where it is granted: below the executor's."""
+CYCLE = 0.4
+"""Of the planner on the twin, as in the paper [s]."""
 ROWS = (
     ("scan's stamp to its arrival", "scan_age"),
     ("scan's arrival to new trajectory", "to_trajectory"),
@@ -34,78 +40,149 @@ ROWS = (
 def add_options(parser: argparse.ArgumentParser) -> None:
     """What `drive` takes."""
     add = parser.add_argument
+    add("config", nargs="?", metavar="CONFIG", help="a robot's file, as hardware/examples has them")
     add(
         "--twin",
-        required=True,
         metavar="SCENARIO",
         help="drive a wheelchair in MuJoCo through a shipped scenario or a file, in real time",
     )
-    add("--seconds", type=float, metavar="S", help="longest (default: the scenario's duration)")
+    add(
+        "--seconds",
+        type=float,
+        metavar="S",
+        help="longest (default: with --twin the scenario's duration, else none)",
+    )
     add("--seed", type=int, default=0, metavar="N", help="of everything random (default: 0)")
-    add("--cycle", type=float, default=0.4, metavar="S", help="of the planner (default: 0.4)")
+    add("--cycle", type=float, metavar="S", help="with --twin: of the planner (default: 0.4)")
     add(
         "--object-speed",
         type=float,
         metavar="V",
-        help="bound on the speed of objects [m/s]; faster movers are slowed down",
+        help="with --twin: bound on the speed of objects [m/s]; faster movers are slowed down",
     )
     add("--threads", type=int, metavar="K", help="of the planner's kernels (default: all cores)")
     add("--out", metavar="FILE", help="write the summary here, as JSON")
-    add("--bag", metavar="FILE", help="record scans and odometry: a .bag of ROS 1, or an .mcap")
+    add("--video", metavar="FILE", help="with --twin: draw the drive when it is over")
+    add(
+        "--live",
+        metavar="FOLDER",
+        help="with --twin: show it as it goes, in a window, or where there is none as"
+        " FOLDER/live.png",
+    )
 
 
 def run(given: argparse.Namespace) -> int:
     """Drive, and print what it came to; returns the exit code.
 
     Raises:
-        ValueError: a bad option, or MuJoCo is not installed.
+        ValueError: a bad option, a bad file, or MuJoCo is not installed.
     """
+    if (given.config is None) == (given.twin is None):
+        raise ValueError(
+            "drive takes a robot's file or --twin SCENARIO, and not both; try"
+            " hardware/examples/emulated.yaml"
+        )
+    return _on_robot(given) if given.twin is None else _on_twin(given)
+
+
+def _on_robot(given: argparse.Namespace) -> int:
+    for option in ("video", "live"):
+        if getattr(given, option) is not None:
+            raise ValueError(f"--{option} goes with --twin: only there it is known what really was")
+    for option in ("cycle", "object_speed"):
+        if getattr(given, option) is not None:
+            raise ValueError(
+                f"--{option.replace('_', '-')} goes with --twin; {given.config} has it as"
+                f" planner.{option}, where its margins are checked with it"
+            )
+    from hardware.config_file import read_config
+
+    config = read_config(Path(given.config))
+    seconds = math.inf
+    if given.seconds is not None:
+        seconds = door.finite("drive", "seconds", given.seconds, above=0.0, unit="s")
+    _start(given.threads)
+    from hardware import driven, on_robot
+    from hardware.priority import put_forward
+
+    print("compiling, and waiting for the robot", file=sys.stderr)
+    try:
+        with on_robot.RobotDrive(config, seed=given.seed) as drive:
+            put_forward("the planner", PRIORITY)
+            print("driving; Ctrl-C brings it to rest, a second one stops it", file=sys.stderr)
+            found = drive.run(seconds, lambda look: print(driven.line(look), file=sys.stderr))
+    except RuntimeError as trouble:
+        print(f"passpmp: {trouble}", file=sys.stderr)
+        return FAILED
+    told = found.summary()
+    print(driven.report(told))
+    _write(given.out, told)
+    if found.interrupted:
+        return INTERRUPTED
+    return 0 if found.reached else FAILED
+
+
+def _on_twin(given: argparse.Namespace) -> int:
     if importlib.util.find_spec("mujoco") is None:
         raise ValueError(
             "--twin needs MuJoCo, which is not installed; pip install 'passpmp_ti[twin]'"
         )
-    from passpmp_ti import backend
-
-    with contextlib.redirect_stdout(io.StringIO()):
-        backend.init(threads=given.threads)
     from hardware.twin import Chain
 
     print("compiling, and starting the twin", file=sys.stderr)
-    chain = Chain(given.twin, seed=given.seed, cycle=given.cycle, object_speed=given.object_speed)
+    cycle = CYCLE if given.cycle is None else given.cycle
+    chain = Chain(
+        given.twin, seed=given.seed, cycle=cycle, object_speed=given.object_speed,
+        threads=given.threads,
+    )  # fmt: skip
     seconds = chain.scenario.duration if given.seconds is None else given.seconds
     door.finite("drive", "seconds", seconds, above=0.0, unit="s")
     with contextlib.ExitStack() as open_:
-        record = None
-        if given.bag:
-            from hardware.bags_drive import DriveWriter
-
-            mounts = [lidar.mount for lidar in chain.scenario.lidars]
-            ahead = time.time() - time.monotonic()
-            writer = DriveWriter(
-                given.bag, mounts, track=chain.robot.track, ahead=ahead,
-                known=chain.navigator.static_map,
-            )  # fmt: skip
-            record = open_.enter_context(writer).see
         open_.enter_context(chain)
-        found = chain.run(seconds, lambda look: print(line(look), file=sys.stderr), record)
+        if given.live is not None:
+            open_.callback(_shown(chain, given.live).close)
+        found = chain.run(seconds, lambda look: print(line(look), file=sys.stderr))
     told = found.summary()
     print(report(told))
-    if given.out:
-        path = Path(given.out)
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(json.dumps(told, indent=2) + "\n")
-        print(f"written to {path}")
+    _write(given.out, told)
+    if given.video is not None:
+        print(f"written to {chain.film(Path(given.video))}")
     if told["interrupted"]:
         return INTERRUPTED
     return FAILED if told["collisions_moving"] else 0
 
 
+def _shown(chain: Chain, folder: str) -> View:
+    from hardware.twin_view import View, ViewConfig
+
+    view = View(ViewConfig(twin=chain.config, begin=chain.twin.begin, folder=folder))
+    print(f"shown in {view.where}", file=sys.stderr)
+    return view
+
+
+def _start(threads: int | None) -> None:
+    """Start the kernels; Taichi greets on standard output, which belongs to the results."""
+    from passpmp_ti import backend
+
+    with contextlib.redirect_stdout(io.StringIO()):
+        backend.init(threads=threads)
+
+
+def _write(out: str | None, told: dict[str, Any]) -> None:
+    if out:
+        path = Path(out)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(json.dumps(told, indent=2) + "\n")
+        print(f"written to {path}")
+
+
 def line(look: Look) -> str:
     """One line of progress."""
     moving = sum(contact.moving for contact in look.contacts)
+    decision = "" if look.record is None else look.record.decision
     return (
         f"t {look.time:6.1f} s   to goal {look.away:6.1f} m   speed {look.speed:6.2f} m/s  "
-        f" {look.record.decision:<8} {look.state:<12} contacts moving {moving},"
+        f" {decision:<8} {look.state:<12} contacts moving {moving},"
         f" at rest {len(look.contacts) - moving}"
     )
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import math
 import select
 import time
 from collections import deque
@@ -13,7 +14,7 @@ from typing import NamedTuple
 from hardware.base import Base, Odometry
 from hardware.executor_settings import ExecutorSettings
 from hardware.held import Held
-from hardware.letterbox import Letterbox
+from hardware.letterbox import MOST_AT_ONCE, Letterbox
 from hardware.messages import (
     MOST_ODOMETRY,
     Ask,
@@ -25,6 +26,7 @@ from hardware.messages import (
     Stop,
     decode,
 )
+from hardware.sleep import Sleep, Slept, asleep
 from hardware.status import State, Status
 from passpmp_ti.robots import DifferentialDrive
 
@@ -65,6 +67,7 @@ class Executor:
         *,
         clock: Callable[[], float] = time.monotonic,
         log: Callable[[Tick], None] | None = None,
+        slept: Callable[[], Slept] = asleep,
     ) -> None:
         """
         Args:
@@ -74,6 +77,7 @@ class Executor:
             directory: of the sockets; who may enter it may drive the robot.
             clock: seconds that never go back, the same for all processes.
             log: told of every tick.
+            slept: tells for how long the machine has slept.
 
         Raises:
             ValueError: the base cannot do what is planned for the robot, or the directory's name
@@ -88,6 +92,7 @@ class Executor:
         self._settings = settings
         self._clock = clock
         self._log = log
+        self._sleep = Sleep(slept)
         self._recent: deque[Odometry] = deque(maxlen=MOST_ODOMETRY)
         self._button = Letterbox(directory / BUTTON)
         self._box = Letterbox(directory / ADDRESS)
@@ -116,7 +121,7 @@ class Executor:
             select.select(listening, [], [], max(due - self._clock(), 0.0))
             pressed = self.hear_button()
             if not leaving:
-                self.hear()
+                self.hear(due)
             now = self._clock()
             if now < due and not pressed:
                 continue
@@ -144,24 +149,25 @@ class Executor:
             self._remember()
         return heard
 
-    def hear(self) -> None:
-        """Hear planner and sensors."""
-        for data, sender in self._box.collect():
-            message = self._read(data)
-            if message is None:
-                continue
-            body, now = message.body, self._clock()
-            if isinstance(body, Offer):
-                name = (message.session, message.sequence)
-                self.held.offer(body.trajectory, name, message.sent_at, now)
-            elif isinstance(body, Beat):
-                self.held.hear(body.source, body.of, now)
-            elif not isinstance(body, Ask):
-                continue
-            self._answer(sender, message)
+    def hear(self, until: float = math.inf) -> None:
+        """Hear planner and sensors, one at least, until the next tick is due: what came with others
+        waits for it, or the wheels would wait for the talk.
+
+        Args:
+            until: when the next tick is due [s].
+        """
+        self._look_up()
+        for _ in range(MOST_AT_ONCE):
+            letters = self._box.collect(1)
+            if not letters:
+                return
+            self._heed(*letters[0])
+            if self._clock() >= until:
+                return
 
     def tick(self) -> None:
         """Look at the base, decide, and tell it."""
+        self._look_up()
         odometry, now = self._base.odometry(), self._clock()
         if odometry is not None and (not self._recent or odometry is not self._recent[-1]):
             self._recent.append(odometry)
@@ -199,6 +205,25 @@ class Executor:
         self._base.close()
         self._button.close()
         self._box.close()
+
+    def _look_up(self) -> None:
+        """Was the machine asleep? To be asked before anything is taken or followed."""
+        if self._sleep.woke():
+            self.held.slept(self._clock())
+
+    def _heed(self, data: bytes, sender: str) -> None:
+        message = self._read(data)
+        if message is None:
+            return
+        body, now = message.body, self._clock()
+        if isinstance(body, Offer):
+            name = (message.session, message.sequence)
+            self.held.offer(body.trajectory, name, message.sent_at, now)
+        elif isinstance(body, Beat):
+            self.held.hear(body.source, body.of, now, message.session)
+        elif not isinstance(body, Ask):
+            return
+        self._answer(sender, message)
 
     def _remember(self) -> None:
         """Whether it was told to stop for good, for the executor after this one. The robot stops

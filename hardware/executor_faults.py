@@ -19,6 +19,7 @@ import sys
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
@@ -44,6 +45,28 @@ PATIENCE = 30.0
 """[s] for what should take a second."""
 
 
+class Tormented(Protocol):
+    """What things break around: a rig, or the whole chain on the twin."""
+
+    @property
+    def settings(self) -> ExecutorSettings:
+        """Of its executor."""
+
+    @property
+    def truth(self) -> Sequence[Odometry]:
+        """Where the robot was so far."""
+
+    @property
+    def fastest(self) -> float:
+        """Ground speed of the faster wheel, in truth [m/s]."""
+
+    def ticks(self) -> list[Tick]:
+        """What its executor did lately."""
+
+    def wait(self, condition: Callable[[], bool], within: float) -> bool:
+        """Whether it came to hold within a time [s]."""
+
+
 @dataclass(frozen=True, slots=True)
 class Run:
     """What became of one."""
@@ -62,7 +85,7 @@ class Run:
     failure: str = ""
 
 
-def try_once(rig: Rig, kind: Kind, rng: np.random.Generator) -> Run:
+def try_once(rig: Tormented, kind: Kind, rng: np.random.Generator) -> Run:
     """Wait until the robot moves, break one thing, look what becomes of it, and mend it."""
     failed = Run(kind.name, math.inf, 0.0, 0.0, 0.0, math.inf)
     if not rig.wait(lambda: rig.fastest > MOVING, PATIENCE):
@@ -129,7 +152,7 @@ def _stalled(times: Sequence[float], began: float, until: float) -> float:
 
 
 def _allowed(
-    rig: Rig, kind: Kind, began: float, truth: Sequence[Odometry], ticks: Sequence[Tick]
+    rig: Tormented, kind: Kind, began: float, truth: Sequence[Odometry], ticks: Sequence[Tick]
 ) -> float:
     """When it has to be at rest, at the latest [s]."""
     known = began + kind.detection

@@ -5,6 +5,7 @@ from __future__ import annotations
 import signal
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 from hardware.executor_rig import NATURE, Rig
 from hardware.executor_trials import CYCLE
@@ -15,8 +16,10 @@ class Kind:
     """A fault, and by when the robot has to be at rest."""
 
     name: str
-    begin: Callable[[Rig], object]
-    end: Callable[[Rig], object]
+    begin: Callable[[Any], object]
+    """Breaks it; is given the rig."""
+    end: Callable[[Any], object]
+    """Mends it."""
     detection: float
     """From the fault until nothing that comes is taken any more, or the robot brakes [s]."""
     brakes: bool

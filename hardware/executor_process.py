@@ -15,10 +15,9 @@ import gc
 import importlib
 import json
 import os
-import select
 import signal
+import stat
 import struct
-import subprocess
 import sys
 import time
 from collections.abc import Callable
@@ -28,10 +27,11 @@ from types import FrameType
 from typing import Any
 
 from hardware.base import Base
-from hardware.child import ended
+from hardware.child import ended, started
 from hardware.executor import Executor, Tick
 from hardware.executor_settings import ExecutorSettings
 from hardware.follower import FollowerSettings
+from hardware.priority import put_forward
 from passpmp_ti import door
 from passpmp_ti.robots import DifferentialDrive
 
@@ -144,23 +144,9 @@ class ExecutorProcess:
         Raises:
             RuntimeError: it did not start; says why.
         """
-        home = str(Path(__file__).parents[1])
-        paths = [home, *filter(None, [os.environ.get("PYTHONPATH")])]
-        self.process = subprocess.Popen(
-            [sys.executable, "-m", "hardware.executor_process", config.to_json()],
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            env={**os.environ, "PYTHONPATH": os.pathsep.join(paths)},
-            # a Ctrl-C is for the planner; what brakes is not to die of it
-            start_new_session=True,
-        )
-        assert self.process.stdout is not None
-        ready, _, _ = select.select([self.process.stdout], [], [], within)
-        if not ready or self.process.stdout.readline() != READY:
-            self.process.kill()
-            _, told = self.process.communicate()
-            raise RuntimeError(f"the executor did not start: {told.decode(errors='replace')}")
+        self.process, told = started("hardware.executor_process", config.to_json(), within)
+        if told != READY:
+            raise RuntimeError(f"the executor did not start: {ended(self.process, 1.0)}")
 
     def __enter__(self) -> ExecutorProcess:
         return self
@@ -178,14 +164,19 @@ class ExecutorProcess:
         return ended(self.process, within)
 
 
-def run(config: ExecutorConfig) -> None:
+def run(config: ExecutorConfig, parent: int) -> None:
     """Be an executor, until a signal or the death of whoever started this process ends it.
+
+    Args:
+        config: all else.
+        parent: process number of whoever started this one.
 
     Raises:
         ValueError: the configuration makes no sense.
     """
     config.directory.mkdir(mode=0o700, parents=True, exist_ok=True)
-    parent, asked = os.getppid(), []
+    check_private(config.directory)
+    asked: list[int] = []
 
     def leave(number: int, frame: FrameType | None) -> None:
         asked.append(number)
@@ -194,7 +185,7 @@ def run(config: ExecutorConfig) -> None:
         signal.signal(number, leave)
     alone = _alone(config.directory)
     if config.priority:
-        _put_first(config.priority)
+        put_forward("the executor", config.priority)
     log = None if config.log is None else os.open(config.log, os.O_WRONLY | os.O_CREAT, 0o600)
     executor = Executor(
         config.build_base(), config.robot, config.settings, config.directory, log=_writer(log)
@@ -209,6 +200,22 @@ def run(config: ExecutorConfig) -> None:
     finally:
         executor.close()
         os.close(alone)
+
+
+def check_private(directory: Path) -> None:
+    """Who may enter the directory of the sockets may drive the robot.
+
+    Raises:
+        ValueError: somebody but this user may.
+    """
+    there = directory.stat()
+    if there.st_uid != os.geteuid() or there.st_mode & 0o077:
+        raise ValueError(
+            f"ExecutorConfig.directory = {directory} must be this user's and closed to all others,"
+            f" since who may enter it can drive the robot; its mode is"
+            f" {stat.S_IMODE(there.st_mode):o}, its owner {there.st_uid}; chmod 700 it, or name"
+            " one that does not exist yet"
+        )
 
 
 def _alone(directory: Path) -> int:
@@ -234,13 +241,6 @@ def _alone(directory: Path) -> int:
             return descriptor
 
 
-def _put_first(priority: int) -> None:
-    try:
-        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(priority))
-    except (OSError, AttributeError) as cause:
-        print(f"the executor has no priority: {cause}; it may be late", file=sys.stderr)
-
-
 def _writer(log: int | None) -> Callable[[Tick], None] | None:
     if log is None:
         return None
@@ -254,11 +254,13 @@ def _writer(log: int | None) -> Callable[[Tick], None] | None:
 
 
 def main() -> int:
-    if len(sys.argv) != 2:
+    if len(sys.argv) not in (2, 3):
         print("example: python -m hardware.executor_process CONFIGURATION", file=sys.stderr)
         return 2
     try:
-        run(ExecutorConfig.from_json(sys.argv[1]))
+        # by hand it ends with the shell that it was started from
+        parent = int(sys.argv[2]) if len(sys.argv) == 3 else os.getppid()
+        run(ExecutorConfig.from_json(sys.argv[1]), parent)
     except ValueError as error:
         print(error, file=sys.stderr)
         return 2

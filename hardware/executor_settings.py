@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from hardware.base import BaseLimits
 from hardware.follower import FollowerSettings
 from passpmp_ti import door
+from passpmp_ti.robots import DifferentialDrive
 from passpmp_ti.settings import Settings
 
 
@@ -19,7 +21,11 @@ class ExecutorSettings:
 
     # when it stops at once
     bound: float = 0.08
-    """The robot is off its path beyond this [m]."""
+    """The robot may be off its path beyond this [m], by the newest odometry and what it may have
+    moved away since."""
+    leaving_speed: float = 0.4
+    """No part of the robot leaves its path faster than this [m/s]: what its wheels slip, and what
+    feedback has them differ from the plan."""
     feedback_timeout: float = 0.06
     """The newest odometry is older than this [s]."""
 
@@ -43,12 +49,17 @@ class ExecutorSettings:
     rest_late: float = 0.1
     """The robot is at rest this long after its path is, at the latest [s]."""
 
+    # when the executor itself is gone
+    runs_on: float = 1.1
+    """The longest way on its last order that is put up with until the base brakes by itself [m]: no
+    plan holds it, so it is no part of what is proven."""
+
     def __post_init__(self) -> None:
         name = "ExecutorSettings"
         door.finite(name, "period", self.period, least=0.005, most=0.02, unit="s")
         for above_0 in (
             "bound", "feedback_timeout", "planner_timeout", "sensor_timeout", "ahead",
-            "rest_speed", "settled_after", "rest_late",
+            "rest_speed", "settled_after", "rest_late", "leaving_speed", "runs_on",
         ):  # fmt: skip
             door.finite(name, above_0, getattr(self, above_0), above=0.0)
         if not isinstance(self.join, (tuple, list)) or len(self.join) != 3:
@@ -67,6 +78,29 @@ class ExecutorSettings:
                 f" of {self.period:g} s"
             )
 
+    @property
+    def reaction(self) -> float:
+        """What the robot moves away from its path from a tick that found it within `bound` to the
+        effect of the next order [m]."""
+        return self.leaving_speed * (self.period + self.follower.delay)
+
+    def check_watchdog(self, limits: BaseLimits, robot: DifferentialDrive) -> None:
+        """A base that hears no more goes on as it was told last until its time-out is over.
+
+        Raises:
+            ValueError: it gets too far by then.
+        """
+        # an order is what is planned and what feedback adds
+        fastest = min(limits.wheel_speed, robot.wheel_speed + self.follower.most)
+        way = fastest * limits.command_timeout
+        if way > self.runs_on:
+            raise ValueError(
+                f"ExecutorSettings.runs_on = {self.runs_on:g} m: if the executor dies, the robot"
+                f" runs on for {way:g} m, at {fastest:g} m/s for BaseLimits.command_timeout ="
+                f" {limits.command_timeout:g} s, before its base brakes; shorten the base's"
+                " time-out, lower the robot's wheel_speed, or put up with a longer way"
+            )
+
     def check_margins(self, settings: Settings, *, scan_age: float) -> None:
         """What the executor allows must lie within what the planner reckons with.
 
@@ -77,11 +111,14 @@ class ExecutorSettings:
         Raises:
             ValueError: it does not.
         """
-        if self.bound > settings.tracking_error:
+        # to the bound by what is known, and on until the next order has an effect
+        most = self.bound + self.reaction
+        if most > settings.tracking_error:
             raise ValueError(
-                f"ExecutorSettings.bound = {self.bound:g} m is above the planner's"
+                f"ExecutorSettings.bound = {self.bound:g} m and the {self.reaction:g} m that the"
+                " robot moves away before it brakes are above the planner's"
                 f" Settings.tracking_error = {settings.tracking_error:g} m: the robot could leave"
-                " what was verified; raise tracking_error, or lower the bound"
+                f" what was verified; raise tracking_error to {most:g} m, or lower the bound"
             )
         # who rests later than planned is hit where who comes had that much longer to come: the
         # same as if the scan were older

@@ -66,9 +66,11 @@ class Held:
     ) -> None:
         """
         Raises:
-            ValueError: the base cannot do what is planned for the robot.
+            ValueError: the base cannot do what is planned for the robot, or runs on for too long
+                where it is told nothing.
         """
         check_fits(limits, robot)
+        settings.check_watchdog(limits, robot)
         self.state = State.STOPPED
         self.reason = Reason.STARTING
         self.error = 0.0
@@ -111,8 +113,19 @@ class Held:
         """Where what is held has the robot at a time: a moment ago, now, or later."""
         return self._leg(time).path.at(time)
 
-    def hear(self, source: Source, of: float, now: float) -> None:
-        """A sign of life, of the time `of`: what is of the future is of another clock."""
+    def hear(self, source: Source, of: float, now: float, session: int | None = None) -> None:
+        """A sign of life, of the time `of`: what is of the future is of another clock, and what a
+        planner says after its successor was followed does not keep that one alive.
+
+        Args:
+            source: who lives.
+            of: when [s].
+            now: when it came [s].
+            session: which run of the planner says so; None: the one that is followed.
+        """
+        stale = session is not None and session < self._newest_taken[0]
+        if source is Source.PLANNER and stale:
+            return
         if of <= now + CLOCK_SLACK:
             self._beats[source] = max(self._beats[source], of)
 
@@ -143,6 +156,12 @@ class Held:
     def stop(self) -> None:
         """Stop for good."""
         self._let_go(State.EMERGENCY, Reason.BUTTON)
+
+    def slept(self, now: float) -> None:
+        """The machine was asleep: clocks stood still meanwhile and the world did not, so what was
+        verified before holds no more."""
+        if self.state in TAKES:
+            self._give_up(Reason.SLEPT, now)
 
     def reset(self) -> bool:
         """Forget an emergency stop, if the robot is at rest. Whether it did."""
@@ -225,7 +244,9 @@ class Held:
         self.error = error_of(odometry, self.at(odometry.stamp), self._robot.overhang)
         if self.state in TAKES:
             self.worst_error = max(self.worst_error, self.error)
-        if self.error > self._settings.bound:
+        # what it may have moved away since it was measured
+        since = max(now - odometry.stamp, 0.0)
+        if self.error + self._settings.leaving_speed * since > self._settings.bound:
             return Reason.OFF_ITS_PATH
         over = self._leg(odometry.stamp).path.end + self._settings.rest_late
         if odometry.stamp > over and not self._rests(odometry):

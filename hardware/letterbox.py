@@ -55,10 +55,14 @@ class Letterbox:
             return False
         return True
 
-    def collect(self) -> list[tuple[bytes, str]]:
-        """What came, in order, each with its sender's address ("" where it has none)."""
+    def collect(self, most: int = MOST_AT_ONCE) -> list[tuple[bytes, str]]:
+        """What came, in order, each with its sender's address ("" where it has none).
+
+        Args:
+            most: letters that are taken.
+        """
         letters: list[tuple[bytes, str]] = []
-        while len(letters) < MOST_AT_ONCE:
+        while len(letters) < most:
             try:
                 # one byte more tells what is too long from what just fits
                 data, sender = self._socket.recvfrom(LONGEST + 1)

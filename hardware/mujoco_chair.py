@@ -113,6 +113,8 @@ class MujocoChair:
         self._told: Odometry | None = None
         self.refused = 0
         """Commands with a number that is none."""
+        self.silent = False
+        """Whether it tells nothing new of where it is, as if its encoders' cable was pulled."""
         self._moved = threading.Condition()
         self._past: deque[Pose] = deque(maxlen=round(REMEMBERED / TIME_STEP))
         x, y, theta = pose
@@ -244,6 +246,8 @@ class MujocoChair:
         turning = [float(self._data.qvel[wheel]) * WHEEL_RADIUS for wheel in self._wheels]
         scales = (n.pose_noise, n.pose_noise, n.heading_noise, n.speed_noise, n.speed_noise)
         noise = np.clip(self._rng.normal(0.0, 1.0, 5), -3.0, 3.0) * scales
+        if self.silent:
+            return
         values = (truth.x, truth.y, truth.theta, *turning)
         told = [value + float(e) for value, e in zip(values, noise, strict=True)]
         self._told = Odometry(self._now, *told)

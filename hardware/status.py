@@ -40,6 +40,8 @@ class Reason(IntEnum):
     ROLLING = 8
     """It should be at rest, and its wheels turn."""
     BUTTON = 9
+    SLEPT = 10
+    """The machine was put to sleep, and woke."""
 
 
 class Verdict(IntEnum):

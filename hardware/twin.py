@@ -1,7 +1,8 @@
 """The whole chain on a physics twin: lidars, TCP, client, planner, executor, wheels, people.
 
 All between the rays and the wheels is what runs on a chair: nothing here knows what is true but
-the judge.
+the judge. Twin, planner and executor are processes; this one starts them, starts a planner that
+died again, and judges.
 """
 
 from __future__ import annotations
@@ -19,35 +20,28 @@ from typing import Any
 import numpy as np
 
 from hardware.base import check_fits
-from hardware.chair_model import WALL_HALF, ChairNature
+from hardware.chair_model import ChairNature
 from hardware.executor_process import ExecutorConfig, ExecutorProcess
-from hardware.link import PlannerLink
-from hardware.merge import Pairing, check_stamp_error, read_together
-from hardware.scip_client import ScipClient
-from hardware.scip_receiver import Pose
-from hardware.scip_settings import ScipSettings
 from hardware.status import State
-from hardware.twin_figures import Chained, Sent, latencies, shares, ticks_of
-from hardware.twin_process import BASE, TwinConfig, TwinProcess, put_forward
-from hardware.twin_settings import APART, executor_settings, settings_of
-from passpmp_ti import door
-from passpmp_ti.grid.static_map import StaticMap
-from passpmp_ti.planner.navigator import Navigator
+from hardware.twin_cycles import NOTHING, Cycle, CycleReader
+from hardware.twin_figures import Chained, chained, last_tick
+from hardware.twin_film import film
+from hardware.twin_picture import Picture
+from hardware.twin_planner import CYCLES, PlannerConfig, PlannerProcess, tell_ports
+from hardware.twin_process import BASE, TwinConfig, TwinProcess
+from hardware.twin_settings import executor_of, settings_of
 from passpmp_ti.robots import DifferentialDrive
-from passpmp_ti.scan import Scan
 from passpmp_ti.sim.contacts import Contact
 from passpmp_ti.sim.drive import Drive
 from passpmp_ti.sim.episode import episode_of
 
-NOWHERE: Pose = (0.0, 0.0, 0.0)
-"""A range finder's pose at a time of which nothing is known; such scans are dropped."""
 STANDING = 0.01
 """Wheels that go no faster over ground than this are at rest, to the judge [m/s]: a chair that
 stands on tyres is never quite still."""
-PRIORITY = 1
-"""Of the planner, of SCHED_FIFO where it is granted: below the twin's and the executor's."""
 TELL = 1.0
-"""From one look at the truth to the next [s]."""
+"""From one line of progress to the next [s]."""
+PACE = 0.2
+"""From one look at what was done to the next [s]."""
 REST = 1.0
 """After the goal is reached it is watched for so much longer [s]."""
 
@@ -59,7 +53,7 @@ class Look:
     time: float
     """Since the drive began [s]."""
     record: Any
-    """The navigator's last."""
+    """The navigator's last; None before the first."""
     speed: float
     """In truth [m/s]."""
     away: float
@@ -70,7 +64,7 @@ class Look:
 
 
 class Chain:
-    """All of it, running: twin, executor, clients and navigator."""
+    """All of it, running: twin, executor and planner."""
 
     def __init__(
         self,
@@ -79,6 +73,10 @@ class Chain:
         seed: int = 0,
         cycle: float = 0.4,
         object_speed: float | None = None,
+        threads: int | None = None,
+        goals: tuple[tuple[float, float], ...] | None = None,
+        ahead: float = 0.0,
+        obeys: bool = False,
     ) -> None:
         """
         Args:
@@ -88,50 +86,56 @@ class Chain:
             cycle: of the planner [s].
             object_speed: bound on the speed of objects [m/s], also of the scenario's movers; None:
                 the scenario's.
+            threads: of the planner's kernels; None: one for each core.
+            goals: to be reached one after the other [m]; None: the scenario's.
+            ahead: the scenario has gone on for so long when the chair begins [s].
+            obeys: whether twin and planner can be told to go wrong.
 
         Raises:
             ValueError: no such scenario, or one that no chair can drive.
-            RuntimeError: a process did not start.
         """
         directory = Path(tempfile.mkdtemp(prefix="twin-"))
-        self._config = TwinConfig(
-            directory=directory, scenario=scenario, seed=seed, object_speed=object_speed
-        )
-        self.directory, self.scenario, self.seed = directory, self._config.load(), seed
+        self.config = TwinConfig(
+            directory=directory, scenario=scenario, seed=seed, object_speed=object_speed,
+            ahead=ahead, obeys=obeys,
+        )  # fmt: skip
+        self.directory, self.scenario, self.seed = directory, self.config.load(), seed
         robot = self.scenario.robot
-        if not isinstance(robot, DifferentialDrive):
-            raise ValueError(
-                f"twin: scenario {self.scenario.name!r} drives a {type(robot).__name__}; the twin"
-                " is a wheelchair: take one with `robot: {type: differential}`"
-            )
-        self.cycle = door.finite("twin", "cycle", cycle, above=0.05, unit="s")
-        self._limits = ChairNature().limits
-        check_fits(self._limits, robot)
-        self.robot = robot
-        self.world, state, self.start_time = self.scenario.build(seed)
-        self.settings = settings_of(self.scenario, cycle, self._config.nature())
-        self._executor_settings = executor_settings(cycle)
-        self._executor_settings.check_margins(
-            self.settings, scan_age=self.settings.stamp_error - self._executor_settings.rest_late
+        assert isinstance(robot, DifferentialDrive)  # or it would not have been loaded
+        self.limits = ChairNature().limits
+        check_fits(self.limits, robot)
+        self.robot, self.cycle = robot, cycle
+        self.goals = self.scenario.goals if goals is None else goals
+        self._threads, self._obeys = threads, obeys
+        self.world, state, _ = self.scenario.build(seed)
+        self.settings = settings_of(self.scenario, self.world, cycle, self.config.nature())
+        self.executor_settings = executor_of(cycle)
+        self.executor_settings.check_margins(
+            self.settings, scan_age=self.settings.stamp_error - self.executor_settings.rest_late
         )
         self.log = self.directory / "ticks"
-        # scans from the wire do not tell what stays: the map does, as on a chair that has one
-        known = self.scenario.static_map
-        if known is None and len(self.world.outline):
-            known = StaticMap.from_segments(self.world.outline, thickness=2 * WALL_HALF)
-        # kernels are compiled before the world begins to turn
-        self.navigator = Navigator(
-            robot, self.settings, goal=self.scenario.goals, static_map=known, seed=seed
-        )
-        self.drive = Drive(self.scenario, self.world, state, self.start_time)
-        self._last: np.ndarray | None = None  # the newest row of the truth
-        self._rows: list[np.ndarray] = []  # of lean and lateness
+        self._state = state
+        self.cycles: list[Cycle] = []
+        """What the planner did."""
+        self.rows: list[np.ndarray] = []
+        """The truth, as `TwinProcess.truth` tells it, piece by piece."""
+        self.revived = 0
+        """Planners that were started because one had died."""
+        self._goals_before = 0  # reached by planners that are gone
+        self._heard = CycleReader(directory / CYCLES)
         self._open = ExitStack()
 
     def __enter__(self) -> Chain:
+        """
+        Raises:
+            RuntimeError: a process did not start.
+        """
         with ExitStack() as open_:
             open_.callback(shutil.rmtree, self.directory, ignore_errors=True)
-            self.twin = TwinProcess(self._config)
+            # kernels are compiled before the world begins to turn
+            self.planner = self.start_planner()
+            open_.callback(lambda: self.planner.close())
+            self.twin = TwinProcess(self.config)
             open_.callback(self.twin.close)
             self.executor = ExecutorProcess(
                 ExecutorConfig(
@@ -139,126 +143,114 @@ class Chain:
                     base="hardware.base_link:build",
                     base_options={
                         "address": str(self.directory / BASE),
-                        **asdict(self._limits),
+                        **asdict(self.limits),
                     },
                     robot=self.robot,
-                    settings=self._executor_settings,
+                    settings=self.executor_settings,
                     log=self.log,
                 )
             )
             open_.callback(self.executor.close)
-            self.link = open_.enter_context(PlannerLink(self.directory, track=self.robot.track))
-            self.clients = [
-                open_.enter_context(
-                    ScipClient(
-                        ScipSettings(
-                            host="127.0.0.1", port=port, range_max=lidar.range_max,
-                        ),
-                        pose_at=self._poser(lidar.pose),
-                    )
-                )
-                for port, lidar in zip(self.twin.ports, self.scenario.lidars, strict=True)
-            ]  # fmt: skip
-            check_stamp_error(self.settings, [c.settings for c in self.clients], APART)
-            # its kernels have threads of their own
-            put_forward("the planner", PRIORITY)
+            # what went before, while all was being started, is no part of the drive
+            self.twin.truth()
+            start = time.monotonic() + self.twin.begin
+            self.drive = Drive(self.scenario, self.world, self._state, start)
+            tell_ports(self.directory, self.twin.ports)
             self._open = open_.pop_all()
         return self
 
     def __exit__(self, *_: object) -> None:
         self._open.close()
 
-    def run(
-        self,
-        seconds: float,
-        see: Callable[[Look], None] | None = None,
-        record: Callable[[tuple[Scan, ...], np.ndarray], None] | None = None,
-    ) -> Chained:
+    @property
+    def goals_reached(self) -> int:
+        """How many of them, so far."""
+        return self._goals_before + (self.cycles[-1].goals_reached if self.cycles else 0)
+
+    def start_planner(self) -> PlannerProcess:
+        """One for the goals that are left.
+
+        Raises:
+            RuntimeError: it did not start; says why.
+        """
+        left = self.goals[self.goals_reached :] or self.goals[-1:]
+        return PlannerProcess(
+            PlannerConfig(
+                twin=self.config, cycle=self.cycle, goals=left, threads=self._threads,
+                obeys=self._obeys,
+            )
+        )  # fmt: skip
+
+    def revive(self) -> None:
+        """Start a planner in the place of one that is gone.
+
+        Raises:
+            RuntimeError: it did not start; says why.
+        """
+        self.see()
+        self.planner.close()
+        fresh = self.start_planner()
+        self.see()  # all that the old one wrote
+        self._goals_before = self.goals_reached
+        self.cycles.append(NOTHING)
+        self.planner = fresh
+        self.revived += 1
+
+    def run(self, seconds: float, see: Callable[[Look], None] | None = None) -> Chained:
         """Drive until the goal is reached, or the time is over, or Ctrl-C.
 
         Args:
             seconds: longest [s].
             see: is shown how it goes, about once a second.
-            record: is shown the scans and the state that each cycle planned on.
+
+        Raises:
+            RuntimeError: a planner that died could not be started again.
         """
-        pairing = Pairing(len(self.clients), apart=APART)
-        sent: list[Sent] = []
-        idle = 0
-        began = due = time.monotonic()
+        began = time.monotonic()
         told_at, reached_at = began, None
         interrupted = False
         try:
-            while time.monotonic() < began + seconds:
-                scans, arrived = self._scans(pairing, due)
-                due = max(due + self.cycle, time.monotonic() - self.cycle)
-                self.link.poll(timeout=0.02)
-                state = None if scans is None else self._state(scans[0].stamp)
-                if scans is None or state is None or not self.link.ready:
-                    idle += 1
-                else:
-                    answer = self.navigator.update(scans, state, following=self.link.following)
-                    self.link.beat(scans[0].stamp)
-                    if self.link.offer(answer):
-                        sent.append(Sent(scans[0].stamp, arrived, time.monotonic(), answer.start))
-                    self.drive.note(self.navigator.record, time.monotonic() - arrived)
-                    if record is not None:
-                        record(scans, state)
-                now = time.monotonic()
-                if now - told_at >= TELL:
+            while (now := time.monotonic()) < began + seconds:
+                time.sleep(PACE)
+                if not self.planner.alive:
+                    self.revive()
+                self.see()
+                if see is not None and now - told_at >= TELL:
                     told_at = now
-                    self._judge()
-                    if see is not None:
-                        see(self._look(now - began))
-                if self.navigator.reached and reached_at is None:
-                    reached_at = now
+                    see(self.look(now - began))
+                if reached_at is None and self.goals_reached >= len(self.goals):
+                    reached_at = self.cycles[-1].at
                 if reached_at is not None and now > reached_at + REST:
                     break
         except KeyboardInterrupt:
             interrupted = True
-        self._judge()
-        return self._chained(sent, idle, reached_at, interrupted)
+        self.see()
+        at = None if reached_at is None else reached_at + self.twin.begin
+        episode = episode_of(self.drive, self.settings, self.seed, at, interrupted)
+        return chained(episode, self.cycles, self.log, np.concatenate(self.rows), self.revived)
 
-    def _scans(self, pairing: Pairing, due: float) -> tuple[tuple[Scan, ...] | None, float]:
-        """The first scans of one instant that come after `due`, and when; those before are read
-        and passed over, as the sockets hold few."""
-        until = max(due, time.monotonic())
-        while (left := until - time.monotonic()) > 0:
-            read_together(self.clients, pairing, left)
-            self.link.poll()
-        found = read_together(self.clients, pairing, 0.25)
-        arrived = time.monotonic()
-        if found is None or any(scan.pose == NOWHERE for scan in found):
-            return None, arrived
-        return found, arrived
+    def film(self, path: Path) -> Path:
+        """Draw what was driven, once it is over. Returns what was written.
 
-    def _poser(self, of_robot: Callable[[np.ndarray], Pose]) -> Callable[[float], Pose]:
-        """Where a range finder is, from where the executor says that the robot is."""
+        Raises:
+            RuntimeError: no video can be written here.
+        """
+        picture = Picture(self.scenario.name, self.world, self.robot)
+        truth = np.concatenate(self.rows)
+        return film(path, picture, truth, self.cycles, self.goals, self.twin.begin)
 
-        def pose_at(when: float) -> Pose:
-            state = self.link.state_at(when)
-            if state is None:
-                self.link.poll(timeout=0.005)
-                state = self.link.state_at(when)
-            return NOWHERE if state is None else of_robot(state)
-
-        return pose_at
-
-    def _state(self, when: float) -> np.ndarray | None:
-        """The robot's at a time; its wheels stand where the executor says that it rests: what
-        they seem to turn then is noise."""
-        state, status = self.link.state_at(when), self.link.status
-        if state is not None and status is not None and status.state is State.RESTING:
-            state[3:] = 0.0
-        return state
-
-    def _judge(self) -> None:
-        """Take note of what really happened since."""
+    def see(self) -> None:
+        """Take note of what was done, and of what really happened, since."""
+        for cycle in self._heard.new():
+            self.cycles.append(cycle)
+            if cycle.record is not None and cycle.took is not None:
+                self.drive.note(cycle.record, cycle.took)
         rows = self.twin.truth()
         if not len(rows):
             return
-        rows = rows if self._last is None else np.concatenate([self._last[None], rows])
-        self._rows.append(rows[:, 6:])
-        self._last = rows[-1]
+        before = self.rows[-1][-1:] if self.rows else rows[:0]
+        self.rows.append(rows)
+        rows = np.concatenate([before, rows])
         if len(rows) < 2:
             return
         states = rows[:, 1:6].copy()
@@ -267,41 +259,16 @@ class Chain:
         states[still, 3:] = 0.0
         self.drive.follow(rows[:, 0] + self.twin.begin, states)
 
-    def _look(self, time: float) -> Look:
-        """How it goes."""
+    def look(self, time: float) -> Look:
+        """How it goes, `time` after it began [s]."""
         x, y = self.drive.states[-1][-1, :2]
-        goal = self.navigator.record.goal or self.navigator.goal
-        status = self.link.status
+        goal = self.goals[min(self.goals_reached, len(self.goals) - 1)]
+        tick = last_tick(self.log)
         return Look(
             time=time,
-            record=self.navigator.record,
+            record=next((c.record for c in reversed(self.cycles) if c.record), None),
             speed=float(self.robot.speed(self.drive.states[-1][-1])),
             away=math.hypot(goal[0] - x, goal[1] - y),
-            state="silent" if status is None else status.state.name.lower(),
+            state="silent" if tick is None else State(int(tick.state)).name.lower(),
             contacts=tuple(self.drive.judge.contacts),
-        )
-
-    def _chained(
-        self, sent: list[Sent], idle: int, reached_at: float | None, interrupted: bool
-    ) -> Chained:
-        """What it came to."""
-        ticks = ticks_of(self.log)
-        to_executor, to_wheels, refused = latencies(sent, ticks)
-        body = np.concatenate(self._rows) if self._rows else np.zeros((1, 2))
-        at = None if reached_at is None else reached_at + self.twin.begin
-        episode = episode_of(self.drive, self.settings, self.seed, at, interrupted)
-        status = self.link.status
-        return Chained(
-            episode=episode,
-            to_trajectory=np.array([one.at - one.arrived for one in sent]),
-            to_executor=to_executor,
-            to_wheels=to_wheels,
-            scan_age=np.array([one.arrived - one.stamp for one in sent]),
-            refused=refused,
-            idle=idle,
-            worst_error=math.nan if status is None else status.worst_error,
-            worst_lean=float(body[:, 0].max()),
-            twin_late=float(np.quantile(body[:, 1], 0.99)),
-            executor_states=shares(ticks),
-            lidars=tuple(client.counters for client in self.clients),
         )

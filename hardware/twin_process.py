@@ -19,7 +19,7 @@ import struct
 import subprocess
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import FrameType
@@ -31,10 +31,13 @@ from hardware.base_link import BaseServer
 from hardware.chair_lidar import ChairLidar
 from hardware.chair_model import ChairNature
 from hardware.child import ended
+from hardware.letterbox import Letterbox
 from hardware.mujoco_chair import MujocoChair
+from hardware.priority import put_forward
 from hardware.scip_device import Device
 from hardware.scip_emulator import Emulator
 from hardware.scip_rotor import Nature
+from hardware.twin_settings import on_chair
 from passpmp_ti import door
 from passpmp_ti.sim.scenario import Scenario, load_scenario
 
@@ -48,10 +51,13 @@ SWITCH = 5e-4
 """A range finder's rays hold up the chair for this long at the most [s]."""
 ROW = struct.Struct(f"<{len(Odometry._fields) + 2}d")
 """A row of the truth: the chair's, how far it leans [rad], and how late the twin is [s]."""
-BASE, TRUTH = "base", "truth"
-"""Names of the base's socket and of the truth's file in the directory."""
-LIDAR_NOISE = 0.01
-"""Standard deviation of a range, cut at three of them [m]."""
+BASE, TRUTH, ORDERS = "base", "truth", "twin-orders"
+"""Names of the base's socket, the truth's file and the socket for orders in the directory."""
+MANY = 1 << 30
+"""Sweeps that go wrong until it is mended."""
+WRONGS = ("cable", "frozen", "reboot", "silent", "")
+"""Orders: no sweep of any lidar comes; all tell what they told; all restart; no odometry comes; all
+is well."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -66,9 +72,14 @@ class TwinConfig:
     """Of the scenario's world, of the chair, and of all noise."""
     object_speed: float | None = None
     """Bound on the speed of objects [m/s]; faster movers are slowed down. None: the scenario's."""
+    ahead: float = 0.0
+    """The scenario has gone on for so long when the chair begins [s]."""
+    obeys: bool = False
+    """Whether it can be told to go wrong: by what is put into the box `ORDERS`."""
 
     def __post_init__(self) -> None:
         door.whole("TwinConfig", "seed", self.seed, least=0)
+        door.finite("TwinConfig", "ahead", self.ahead, least=0.0, unit="s")
 
     def to_json(self) -> str:
         """As the process is told it."""
@@ -91,13 +102,32 @@ class TwinConfig:
         """The scenario.
 
         Raises:
-            ValueError: there is none of that name, or something is wrong with it.
+            ValueError: there is none of that name, something is wrong with it, or no chair can
+                drive it.
         """
-        return load_scenario(self.scenario).changed(object_speed=self.object_speed)
+        return on_chair(load_scenario(self.scenario).changed(object_speed=self.object_speed))
 
     def nature(self) -> ChairNature:
         """The chair that this seed draws."""
         return ChairNature.drawn(np.random.default_rng([self.seed, 2]))
+
+
+class TruthReader:
+    """Reads what a twin writes down."""
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self._read = 0
+
+    def new(self) -> np.ndarray:
+        """[n, 8] what really was since the last call: stamp, x, y, theta, right and left over
+        ground, lean, lateness."""
+        with self._path.open("rb") as file:
+            file.seek(self._read)
+            data = file.read()
+        whole = len(data) // ROW.size * ROW.size
+        self._read += whole
+        return np.frombuffer(data[:whole], dtype="<f8").reshape(-1, ROW.size // 8)
 
 
 class TwinProcess:
@@ -114,8 +144,7 @@ class TwinProcess:
         """
         home = str(Path(__file__).parents[1])
         paths = [home, *filter(None, [os.environ.get("PYTHONPATH")])]
-        self._truth = config.directory / TRUTH
-        self._read = 0
+        self._truth = TruthReader(config.directory / TRUTH)
         self.process = subprocess.Popen(
             [sys.executable, "-m", "hardware.twin_process", config.to_json()],
             stdin=subprocess.DEVNULL,
@@ -142,14 +171,8 @@ class TwinProcess:
         """The world's time is this much ahead of the clock's [s]."""
 
     def truth(self) -> np.ndarray:
-        """[n, 8] what really was since the last call: stamp, x, y, theta, right and left over
-        ground, lean, lateness."""
-        with self._truth.open("rb") as file:
-            file.seek(self._read)
-            data = file.read()
-        whole = len(data) // ROW.size * ROW.size
-        self._read += whole
-        return np.frombuffer(data[:whole], dtype="<f8").reshape(-1, ROW.size // 8)
+        """[n, 8] what really was since the last call, as `TruthReader.new`."""
+        return self._truth.new()
 
     def close(self, within: float = 10.0) -> str:
         """End it. Returns what it complained of."""
@@ -177,7 +200,7 @@ def run(config: TwinConfig) -> None:
     rng = np.random.default_rng([config.seed, 3])
     own, *others = rng.spawn(1 + len(scenario.lidars))
     x, y, theta = (float(v) for v in state[:3])
-    begin = start_time - (time.monotonic() + GREETING)
+    begin = start_time + config.ahead - (time.monotonic() + GREETING)
     rows = bytearray()
 
     def note(truth: Odometry) -> None:
@@ -190,6 +213,7 @@ def run(config: TwinConfig) -> None:
         _emulated(chair, mount, generator)
         for mount, generator in zip((d.mount for d in scenario.lidars), others, strict=True)
     ]
+    orders = Letterbox(config.directory / ORDERS) if config.obeys else None
     gc.collect()
     gc.freeze()
     gc.disable()
@@ -200,13 +224,28 @@ def run(config: TwinConfig) -> None:
             select.select([server], [], [], LOOK)
             server.step()
             chair.advance()
+            if orders is not None:
+                for order, _ in orders.collect():
+                    _obey(order.decode(), chair, emulators)
             os.write(log, rows)
             rows.clear()
     finally:
         for emulator in emulators:
             emulator.close()
+        if orders is not None:
+            orders.close()
         server.close()
         os.close(log)
+
+
+def _obey(order: str, chair: MujocoChair, emulators: Sequence[Emulator]) -> None:
+    """Go wrong, as one of `WRONGS`."""
+    chair.silent = order == "silent"
+    for emulator in emulators:
+        emulator.inject("drop", MANY if order == "cable" else 0)
+        emulator.inject("freeze", MANY if order == "frozen" else 0)
+        if order == "reboot":
+            emulator.reboot()
 
 
 def _emulated(
@@ -216,21 +255,12 @@ def _emulated(
     rate = 1.0 + float(rng.uniform(-5e-5, 5e-5))
     start, uneven = int(rng.integers(1 << 24)), float(rng.uniform(-2e-3, 2e-3))
     nature = Nature(clock_start=start, clock_rate=rate, unevenness=uneven)
-    source = ChairLidar(chair, mount, rng, noise=LIDAR_NOISE)
+    source = ChairLidar(chair, mount, rng)
 
     def make(now: float, source: Callable[[float], np.ndarray] = source) -> Device:
         return Device(source, now, nature)
 
     return Emulator(make)
-
-
-def put_forward(who: str, priority: int) -> None:
-    """Give all threads of this process a priority of SCHED_FIFO, or say that none is granted."""
-    try:
-        for thread in os.listdir("/proc/self/task"):
-            os.sched_setscheduler(int(thread), os.SCHED_FIFO, os.sched_param(priority))
-    except (OSError, AttributeError) as cause:
-        print(f"{who} has no priority: {cause}; it may be late", file=sys.stderr)
 
 
 def main() -> int:

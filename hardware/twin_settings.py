@@ -1,42 +1,86 @@
-"""The margins that a chair, its executor and its range finders ask of a planner, on the twin."""
+"""How the chair is driven on the twin, and the margins that chair, executor and lidars ask of a
+planner for it."""
 
 from __future__ import annotations
 
-import math
+from dataclasses import replace
 
-from hardware.chair_model import WALL_HALF, ChairNature
+from hardware.chair_lidar import LIDAR_NOISE
+from hardware.chair_model import ChairNature
 from hardware.executor_settings import ExecutorSettings
+from hardware.margins import APART, executor_settings, with_margins
 from hardware.scip_settings import ScipSettings
-from hardware.twin_process import LIDAR_NOISE
+from passpmp_ti.robots import DifferentialDrive
 from passpmp_ti.settings import Settings
 from passpmp_ti.sim.scenario import Scenario
+from passpmp_ti.sim.world import World
 
-APART = 0.0135
-"""Stamps of two range finders that are joined differ by this at the most [s]."""
-HASTE = 0.02
-"""What a cycle needs beside planning, from the scan's stamp to the executor [s]."""
-SWEEP_SHIFT = 0.02
-"""What the chair moves in half a sweep, at 2 m/s [m]."""
+TOP_SPEED = 1.0
+"""Of a wheel [m/s]: what a chair moves in half a sweep grows with it."""
+RANGE = 6.0
+"""How far the lidars are believed [m]: the guide's grid grows with it, and has a bounded number of
+cells. Beyond 5 cm their sides close a passage that the chair fits through."""
+CELL = 0.03
+"""Side of the grid's cells [m]: finer than for a chair that drives in the open."""
+SLIMMEST = 0.2
+"""Radius of the slimmest who walks [m], where the scenario has nobody slimmer."""
+BOUND = 0.042
+"""Off its path the chair stops [m]: it is 22 mm off in an ordinary drive."""
+REST_LATE = 0.06
+"""It rests this long after its path, or is stopped [s]: 40 ms in an ordinary drive."""
+LEAN = 0.005
+"""What a chair that leans as it brakes and turns adds to a range [m]."""
+FROZEN_AFTER = 1
+"""Sweeps that tell the very same distances as those before and are still not believed, from the
+first: a lidar has noise."""
 
 
-def settings_of(scenario: Scenario, cycle: float, nature: ChairNature) -> Settings:
-    """The scenario's settings with the margins that chair, executor and lidars ask for."""
-    executor = executor_settings(cycle)
-    scan_age = ScipSettings(host="127.0.0.1").stamp_error + APART
-    return scenario.settings.changed(
-        cycle=cycle,
-        deadline=cycle - HASTE,
-        # what it moves away between two odometries is not seen
-        tracking_error=executor.bound + 0.01,
-        localisation_error=math.ceil(100 * (nature.localisation_error + SWEEP_SHIFT)) / 100,
-        range_noise=3 * LIDAR_NOISE + WALL_HALF,
-        stamp_error=scan_age + executor.rest_late,
+def on_chair(scenario: Scenario) -> Scenario:
+    """A scenario as the chair drives it.
+
+    Raises:
+        ValueError: it drives something else.
+    """
+    robot = scenario.robot
+    if not isinstance(robot, DifferentialDrive):
+        raise ValueError(
+            f"twin: scenario {scenario.name!r} drives a {type(robot).__name__}; the twin is a"
+            " wheelchair: take one with `robot: {type: differential}`"
+        )
+    return replace(
+        scenario,
+        robot=replace(robot, wheel_speed=min(robot.wheel_speed, TOP_SPEED)),
+        lidars=tuple(replace(d, range_max=min(d.range_max, RANGE)) for d in scenario.lidars),
     )
 
 
-def executor_settings(cycle: float) -> ExecutorSettings:
-    """Whom it believes for how long: a cycle and a half, and some."""
-    patience = 1.5 * cycle + 0.15
-    return ExecutorSettings(
-        planner_timeout=patience, sensor_timeout=patience, ahead=max(2.0, 2 * cycle)
+def scip_settings(port: int, range_max: float) -> ScipSettings:
+    """Of one of the twin's lidars, on a port, believed up to `range_max` [m]."""
+    return ScipSettings(
+        host="127.0.0.1", port=port, range_max=range_max, frozen_after=FROZEN_AFTER
+    )
+
+
+def executor_of(cycle: float) -> ExecutorSettings:
+    """The chair's executor, for a planner's cycle [s]."""
+    return executor_settings(cycle, bound=BOUND, rest_late=REST_LATE)
+
+
+def settings_of(scenario: Scenario, world: World, cycle: float, nature: ChairNature) -> Settings:
+    """The scenario's settings with the margins that chair, executor and lidars ask for.
+
+    What the chair moves and turns in half a sweep, and the error of its heading, is taken from the
+    scans themselves (`steady.py`), by what it is at the time: no margin for the greatest is needed.
+    """
+    slimmest = min([SLIMMEST, *world.movers.radius.tolist()])
+    return with_margins(
+        scenario.settings.changed(
+            cell=CELL, object_radius=slimmest, cruise_speed=scenario.robot.top_speed
+        ),
+        executor_of(cycle),
+        cycle=cycle,
+        localisation_error=nature.localisation_error,
+        range_noise=3 * LIDAR_NOISE + LEAN,
+        scan_age=scip_settings(1, RANGE).stamp_error + APART,
+        top_speed=0.0,
     )

@@ -403,7 +403,8 @@ def test_a_planners_trajectories_are_taken_and_followed_within_its_margins(chain
     executor = ExecutorSettings()
     settings = Settings.for_robot(
         ROBOT, object_speed=0.5, cell=0.1, capacity=400, particles=20, iterations=20,
-        tracking_error=executor.bound, stamp_error=executor.rest_late,
+        tracking_error=executor.bound + executor.reaction,
+        stamp_error=executor.rest_late,
     )  # fmt: skip
     executor.check_margins(settings, scan_age=0.0)
     navigator = Navigator(ROBOT, settings, goal=(3.0, 0.5))

@@ -152,7 +152,7 @@ def test_without_the_swing_of_the_body_the_error_would_miss_a_disc():
 
 
 def planner(**changes):
-    return Settings.for_robot(ROBOT, tracking_error=0.08, stamp_error=0.15).changed(**changes)
+    return Settings.for_robot(ROBOT, tracking_error=0.09, stamp_error=0.15).changed(**changes)
 
 
 def test_a_bound_within_the_planners_margins_is_let_in():
@@ -163,6 +163,7 @@ def test_a_bound_within_the_planners_margins_is_let_in():
     ("changes", "named"),
     [
         ({"tracking_error": 0.079}, "Settings.tracking_error"),
+        ({"tracking_error": 0.08}, "Settings.tracking_error"),  # no room for the reaction
         ({"stamp_error": 0.129}, "Settings.stamp_error"),
         ({"cycle": 0.4}, "planner_timeout"),
     ],

@@ -18,13 +18,18 @@ REQUIRED: Any = object()
 class Document:
     """A YAML file whose root is a mapping, and what is wrong with it."""
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, owner: str = "scenario") -> None:
         """Read a file.
+
+        Args:
+            path: the file.
+            owner: what its own fields are said to be of.
 
         Raises:
             ValueError: it cannot be read, is not YAML, or is not a mapping.
         """
         self.path = path
+        self.owner = owner
         self.problems: list[tuple[int, str]] = []
         try:
             node = yaml.compose(path.read_text(encoding="utf-8"), Loader=yaml.SafeLoader)
@@ -170,7 +175,7 @@ class Section:
 
     @property
     def _owner(self) -> str:
-        return self.name or "scenario"
+        return self.name or self.document.owner
 
     def _full(self, key: str) -> str:
         return f"{self.name}.{key}" if self.name else key

@@ -1,0 +1,86 @@
+"""The margins that a robot, its executor and its range finders ask of a planner: the one place
+where what was measured becomes what is reckoned with."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from hardware.executor_settings import ExecutorSettings
+from passpmp_ti import door
+from passpmp_ti.settings import Settings
+
+APART = 0.0135
+"""Stamps of two range finders that are joined differ by this at the most [s]."""
+HASTE = 0.02
+"""What a cycle needs beside planning, from the scan's stamp to the executor [s]."""
+HALF_SWEEP = 0.01
+"""A pose is that of a sweep's middle; no beam is farther from it than this [s]: 9.5 ms of a
+UST-10LX."""
+
+
+def with_margins(
+    settings: Settings,
+    executor: ExecutorSettings,
+    *,
+    cycle: float,
+    localisation_error: float,
+    range_noise: float,
+    scan_age: float,
+    top_speed: float,
+) -> Settings:
+    """A planner's settings with the margins that the rest of the chain asks for.
+
+    Lengths are rounded up to whole centimetres: more margin, never less.
+
+    Args:
+        settings: for the rest.
+        executor: follows what is planned.
+        cycle: of the planner [s].
+        localisation_error: greatest error of a told pose [m].
+        range_noise: greatest error of a range [m].
+        scan_age: how much older than its stamp a beam may be [s].
+        top_speed: of the robot [m/s].
+
+    Raises:
+        ValueError: a cycle that leaves no time to plan, or settings that make no sense.
+    """
+    door.finite("margins", "cycle", cycle, above=HASTE, unit="s")
+    return settings.changed(
+        cycle=cycle,
+        deadline=cycle - HASTE,
+        tracking_error=_up(executor.bound + executor.reaction),
+        localisation_error=_up(localisation_error + HALF_SWEEP * top_speed),
+        range_noise=range_noise,
+        stamp_error=scan_age + executor.rest_late,
+    )
+
+
+def executor_settings(cycle: float, **changes: Any) -> ExecutorSettings:
+    """An executor that believes planner and sensor for a cycle [s] and a half, and some.
+
+    Args:
+        cycle: of the planner [s].
+        changes: fields of `ExecutorSettings` on top.
+    """
+    silent = 1.5 * cycle + 0.15
+    usual = {"planner_timeout": silent, "sensor_timeout": silent, "ahead": max(2.0, 2 * cycle)}
+    return ExecutorSettings(**{**usual, **changes})
+
+
+def deceleration(speed: float, distance: float) -> float:
+    """How hard a robot brakes that came to rest so far from where it was told to [m/s^2].
+
+    As if it had braked evenly all the way: what delay and lag cost is in it. So it is less than
+    what the robot does once it brakes, and never more.
+
+    Args:
+        speed: when it was told [m/s].
+        distance: from there to rest [m].
+    """
+    return speed**2 / (2.0 * distance)
+
+
+def _up(length: float) -> float:
+    """To the next centimetre; a length that is one already stays."""
+    return math.ceil(100.0 * length - 1e-9) / 100.0

@@ -1,0 +1,111 @@
+"""Sweeps that were measured on the way, told as scans from one place.
+
+A mirror takes 19 ms for a sweep; meanwhile the robot rolls and turns, and nobody knows exactly when
+which beam was measured, or where the robot headed. A scan has one pose. So each beam tells the
+least that any beam saw which may have looked along it: what is proven empty shrinks, by what the
+robot really moved, and nothing of it is left to `Settings.localisation_error`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from hardware.scip_client import ScipClient
+from hardware.scip_receiver import Pose
+from hardware.scip_settings import ScipSettings
+from passpmp_ti import door
+from passpmp_ti.scan import Scan
+
+OWN = 0.3
+"""At both ends of a sweep all that is nearer than this is the robot's own body [m]."""
+BELIEVED = 1.25
+"""Wheels slip: the robot may roll and turn faster than they tell, by this factor."""
+SPEED_ERROR = 0.05
+"""And by this [m/s]: noise, and what changes within half a sweep."""
+
+
+def steadied(scan: Scan, shift: float, turn: float) -> Scan:
+    """What a sweep proves for a sensor that stands at the scan's pose.
+
+    A place at distance s along a bearing was looked at from up to `shift` away: at a bearing that
+    differs by `turn` and asin(shift / s), to a distance that differs by `shift`. Whatever beam may
+    have looked there has its say. A step more, since what lies between two beams is known from
+    both.
+
+    Args:
+        scan: of a sensor that moved.
+        shift: greatest distance of the sensor from the scan's pose in the sweep [m].
+        turn: greatest error of a beam's bearing, turning and error of heading together [rad].
+
+    Returns:
+        The scan with ranges that are never longer. Beams at both ends, past which nobody may have
+        looked, are lost.
+
+    Raises:
+        ValueError: a bound that is negative or no number.
+    """
+    door.finite("steadied", "shift", shift, least=0.0, unit="m")
+    door.finite("steadied", "turn", turn, least=0.0, unit="rad")
+    lost = scan.lost
+    nearer = np.where(lost, 0.0, np.maximum(scan.ranges - shift, 0.0))
+    away = np.maximum(nearer, shift)
+    sideways = np.arcsin(np.divide(shift, away, out=np.ones_like(away), where=away > 0))
+    sideways[lost | (shift == 0.0)] = 0.0
+    # up, and a step more: every rounding widens
+    reach = np.ceil((turn + sideways) / scan.angle_increment).astype(np.int64) + 1
+    told = nearer.copy()
+    for off in range(1, min(int(reach.max()), len(told) - 1) + 1):
+        spread = np.where(reach >= off, nearer, np.inf)
+        np.minimum(told[off:], spread[:-off], out=told[off:])
+        np.minimum(told[:-off], spread[off:], out=told[:-off])
+    beside = turn + math.asin(min(shift / OWN, 1.0))
+    ends = math.ceil(beside / scan.angle_increment) + 1
+    told[:ends] = told[-ends:] = 0.0
+    return replace(scan, ranges=told)
+
+
+class SteadyClient(ScipClient):
+    """A client whose scans are steadied by how the robot moved."""
+
+    def __init__(
+        self,
+        settings: ScipSettings,
+        *,
+        state_at: Callable[[float], np.ndarray | None],
+        pose_at: Callable[[float], Pose],
+        track: float,
+        arm: float,
+        heading_error: float,
+    ) -> None:
+        """
+        Args:
+            settings: of the device.
+            state_at: [5] the robot's state (x, y, theta, v_r, v_l) at a time; None: nobody knows.
+            pose_at: the sensor's pose at a time.
+            track: distance between the driven wheels [m].
+            arm: of the sensor, about the point between these [m].
+            heading_error: bound on the error of a told heading [rad].
+        """
+        super().__init__(settings, pose_at=pose_at)
+        self._state_at, self._track = state_at, track
+        self._arm, self._heading_error = arm, heading_error
+
+    def read(self, timeout: float) -> Scan | None:
+        scan = super().read(timeout)
+        if scan is None:
+            return None
+        # no beam is measured farther from the pose's moment than this
+        half = 0.5 * self.settings.stamp_error
+        state = self._state_at(scan.stamp - half)
+        if state is None:
+            return replace(scan, ranges=np.full_like(scan.ranges, math.nan))
+        right, left = (float(v) for v in state[3:])
+        rolling = BELIEVED * 0.5 * abs(right + left) + SPEED_ERROR
+        turning = (BELIEVED * abs(right - left) + SPEED_ERROR) / self._track
+        return steadied(
+            scan, half * (rolling + turning * self._arm), half * turning + self._heading_error
+        )

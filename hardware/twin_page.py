@@ -1,0 +1,207 @@
+"""The page of what was driven on the twin, from the folders of its campaigns.
+
+    python -m hardware.twin_page --experiments out/twin --faults out/twin-faults \\
+        --page docs/twin-results.md
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from hardware.twin_experiments import EXPERIMENTS, LATE, TRIES
+from passpmp_ti.compare.job import Result
+from passpmp_ti.compare.ledger import EPISODES, Ledger
+
+HEAD = """# What was driven on the twin
+
+Made by `python -m hardware.twin_page`; do not edit. How the twin is made, and what the numbers
+rest on: [twin.md](twin.md). All of it is real time, through the whole chain: range finders' rays,
+SCIP over TCP, client, planner, executor, wheels; twin, planner and executor are processes of
+their own.
+"""
+EXPERIMENTS_HEAD = """## The paper's four experiments
+
+`python -m hardware.twin_experiments --runs N --out FOLDER`. Each seed draws a chair, where it
+begins, and all noise. Contacts are the truth's: *moving* if the chair moved at any moment of it.
+*Stood*: the longest time at rest on the way, least and greatest of the drives. In
+`corridor_person` the way is blocked until the person leaves; `dead_end` has no way to its goal,
+and is over when its time is: there the column tells how many stood at rest then.
+"""
+LATENCIES_HEAD = """### Times in the chain
+
+From the scan's stamp to its arrival, and from its arrival on: medians of the drives' medians, and
+the greatest of their 99th percentiles. The wheels have a trajectory when it begins, a cycle after
+the scan's stamp. *Twin late*: the worst of any moment of any drive.
+"""
+FAULTS_HEAD = """## Faults in the chain
+
+`python -m hardware.twin_faults --runs N --out FOLDER`. The chair drives to and fro in the
+corridor. At a random moment while it moves faster than 0.25 m/s one thing breaks. *Allowed* is
+the end of what was held when the fault could be known, and `rest_late`; or, where it brakes off
+its path, the detection time, the braking time from the speed it had, and `rest_late`. *Failed*:
+late at rest, or moved while the fault lasted, or did not drive again once it was mended.
+*Touched*: contacts while it moved.
+"""
+DISTURBED = (
+    f"A drive in which the twin itself was late by more than {1e3 * LATE:.0f} ms at any moment is"
+    f" disturbed: it is driven again, up to {TRIES} drives in all, and the last one counts."
+    " Contacts of those before are counted as well."
+)
+
+
+def experiments(found: Iterable[Result]) -> str:
+    """Both tables of the experiments, as markdown."""
+    known = list(found)
+    drives, times = [], []
+    for e in EXPERIMENTS:
+        these = [f for f in known if f["scenario"] == e.scenario and f["variant"] == e.variant]
+        if these:
+            name = f"Fig. {e.figure}, `{e.scenario}`, {e.cycle:g} s"
+            drives.append([name, f"{e.object_speed:g}", *_drives(these)])
+            times.append([name, *_times(these)])
+    again = sum(len(f["disturbed"]) for f in known)
+    rest = sum(not f["quiet"] for f in known)
+    touched = sum(d["collisions_moving"] for f in known for d in f["disturbed"])
+    return "\n\n".join([
+        EXPERIMENTS_HEAD,
+        _table(
+            ["experiment, cycle", "objects [m/s]", "drives", "goal reached", "time to it [s]",
+             "contacts moving, at rest", "nearest wall, mover [m]", "stood [s]",
+             "off its path [mm]", "stops off what is held"],
+            drives,
+        ),
+        LATENCIES_HEAD,
+        _table(
+            ["experiment, cycle", "stamp to arrival [ms]", "to new trajectory [ms]",
+             "to executor [ms]", "to wheels [ms]", "sent; not taken", "cycles without a scan",
+             "twin late [ms]"],
+            times,
+        ),
+        f"{DISTURBED} That happened {again} times, with {touched} contacts while moving; {rest} of"
+        f" the {len(known)} drives were disturbed to the last.",
+    ])  # fmt: skip
+
+
+def faults(found: Iterable[Result]) -> str:
+    """The table of the faults, as markdown."""
+    known = list(found)
+    rows = []
+    for name in dict.fromkeys(f["kind"] for f in known):
+        these = [f for f in known if f["kind"] == name]
+        took, back = [f["took"] for f in these], [f["back"] for f in these]
+        rows.append([
+            name, str(len(these)), str(sum(bool(f["failure"]) for f in these)),
+            str(sum(f["touched"] for f in these)),
+            f"{np.median(took):.2f}, {max(took):.2f}",
+            f"{min(f['allowed'] - f['took'] for f in these):.2f}",
+            f"{np.median(back):.2f}, {max(back):.2f}",
+        ])  # fmt: skip
+    again = sum(len(f["disturbed"]) for f in known)
+    failed = sum(bool(d["failure"]) for f in known for d in f["disturbed"])
+    touched = sum(d["touched"] for f in known for d in f["disturbed"])
+    return "\n\n".join([
+        FAULTS_HEAD,
+        _table(
+            ["fault", "runs", "failed", "touched", "to rest: median, longest [s]",
+             "least to spare [s]", "drives again after: median, longest [s]"],
+            rows,
+        ),
+        f"{again} runs in which the twin was late by more than {1e3 * LATE:.0f} ms were run again:"
+        f" {failed} of those failed, with {touched} contacts while moving.",
+        *(f"- {f['kind']} {f['seed']}: {f['failure']}" for f in known if f["failure"]),
+    ])  # fmt: skip
+
+
+def _drives(these: Sequence[Result]) -> list[str]:
+    reached = sum(f["reached_goal"] for f in these)
+    rest = sum(f["rests_at_last"] for f in these)
+    times = [f["time_to_goal"] for f in these if f["reached_goal"]]
+    stops: dict[str, int] = {}
+    for found in these:
+        for reason, count in found["stops"].items():
+            stops[reason] = stops.get(reason, 0) + count
+    goal = f"{reached} (at rest {rest})" if these[0]["scenario"] == "dead_end" else str(reached)
+    walls = [f["nearest_fixed_moving"] for f in these if f["nearest_fixed_moving"] is not None]
+    movers = [
+        f["nearest_approach_moving"] for f in these if f["nearest_approach_moving"] is not None
+    ]
+    return [
+        str(len(these)), goal,
+        f"{np.median(times):.1f} ({min(times):.1f} to {max(times):.1f})" if times else "-",
+        f"{sum(f['collisions_moving'] for f in these)},"
+        f" {sum(f['collisions_at_rest'] for f in these)}",
+        ", ".join(f"{min(near):.2f}" if near else "-" for near in (walls, movers)),
+        f"{min(f['longest_stand'] for f in these):.1f} to"
+        f" {max(f['longest_stand'] for f in these):.1f}",
+        f"{1e3 * max(f['worst_error'] for f in these):.0f}",
+        ", ".join(f"{name.replace('_', ' ')} {n}" for name, n in stops.items()) or "none",
+    ]  # fmt: skip
+
+
+def _times(these: Sequence[Result]) -> list[str]:
+    def both(key: str) -> str:
+        known = [f for f in these if f[f"{key}_median"] is not None]
+        if not known:
+            return "-"
+        median = np.median([f[f"{key}_median"] for f in known])
+        return f"{1e3 * median:.1f}, {1e3 * max(f[f'{key}_p99'] for f in known):.1f}"
+
+    return [
+        both("scan_age"), both("to_trajectory"), both("to_executor"), both("to_wheels"),
+        f"{sum(f['sent'] for f in these)}; {sum(f['refused'] for f in these)}",
+        f"{sum(f['idle'] for f in these)}",
+        f"{1e3 * max(f['twin_latest'] for f in these):.0f}",
+    ]  # fmt: skip
+
+
+def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    lines = [head, ["---"] * len(head), *rows]
+    return "\n".join("| " + " | ".join(line) + " |" for line in lines)
+
+
+def page(driven: Mapping[str, Iterable[Result]], machines: Iterable[str]) -> str:
+    """The page.
+
+    Args:
+        driven: results of "experiments" and of "faults", where there are any.
+        machines: what it was driven on.
+    """
+    parts = [HEAD, f"Driven on {'; '.join(sorted(set(machines)))}."]
+    if "experiments" in driven:
+        parts.append(experiments(driven["experiments"]))
+    if "faults" in driven:
+        parts.append(faults(driven["faults"]))
+    return "\n\n".join(part.strip() for part in parts) + "\n"
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(
+        description="Write the page of what was driven on the twin.",
+        epilog="example: python -m hardware.twin_page --experiments out/twin --page twin.md",
+    )
+    parser.add_argument("--experiments", type=Path, metavar="FOLDER")
+    parser.add_argument("--faults", type=Path, metavar="FOLDER")
+    parser.add_argument("--page", type=Path, required=True, metavar="FILE")
+    given = parser.parse_args()
+    driven: dict[str, list[Result]] = {}
+    for name in ("experiments", "faults"):
+        folder = getattr(given, name)
+        if folder is None:
+            continue
+        if not (folder / EPISODES).exists():
+            print(f"--{name} {folder} holds nothing that was driven", file=sys.stderr)
+            return 2
+        driven[name] = list(Ledger(folder, {}).results.values())
+    machines = [f["timings"]["machine"] for found in driven.values() for f in found]
+    given.page.write_text(page(driven, machines), encoding="utf-8")
+    print(f"written to {given.page}")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

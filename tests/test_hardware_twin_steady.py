@@ -1,0 +1,115 @@
+"""Sweeps of a sensor that moved: what they are taken to prove is what they saw."""
+
+import math
+
+import numpy as np
+import pytest
+
+from hardware.steady import OWN, steadied
+from passpmp_ti.scan import Scan
+
+STEP = math.radians(0.25)
+BEAMS = 1081
+FIRST = -math.radians(135)
+WALLS = np.array(
+    [[0.7, 0.65, 0.9, 0.65], [0.9, 0.65, 0.9, 5.0], [0.7, 0.65, 0.7, 5.0], [0.9, -5.0, 0.9, -0.65],
+     [-2.0, -1.2, 6.0, -1.2], [6.0, -3.0, 6.0, 3.0], [-0.4, 0.5, -0.3, 3.0]]
+)  # fmt: skip
+"""A passage with edges close by, a wall along the way, one ahead."""
+
+
+def cast(place, bearings):
+    """[n] true ranges from a place along bearings [m]."""
+    ahead = np.stack([np.cos(bearings), np.sin(bearings)], axis=1)
+    a, b = WALLS[:, :2] - place, WALLS[:, 2:] - WALLS[:, :2]
+    across = ahead[:, None, 0] * b[:, 1] - ahead[:, None, 1] * b[:, 0]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        along = (a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]) / across
+        share = (a[:, 0] * ahead[:, None, 1] - a[:, 1] * ahead[:, None, 0]) / across
+    met = (along > 0) & (share >= 0) & (share <= 1)
+    return np.where(met, along, np.inf).min(axis=1)
+
+
+def swept(shift, turn, rng):
+    """A scan at pose 0 of a sensor that was elsewhere: up to `shift`, turned by up to `turn`.
+
+    Returns:
+        The scan, and the pose of each beam [BEAMS, 3].
+    """
+    way = rng.uniform(-math.pi, math.pi)
+    pace = np.linspace(-1.0, 1.0, BEAMS)
+    poses = np.stack(
+        [shift * pace * math.cos(way), shift * pace * math.sin(way), turn * pace], axis=1
+    )
+    bearings = FIRST + STEP * np.arange(BEAMS) + poses[:, 2]
+    ranges = np.array(
+        [cast(pose[:2], np.array([b]))[0] for pose, b in zip(poses, bearings, strict=True)]
+    )
+    return Scan(ranges, FIRST, STEP, 10.0, (0.0, 0.0, 0.0), 0.0), poses
+
+
+def unproven(scan, poses, rng, count=4000):
+    """How many of random places that a scan proves empty no beam of the sweep proved so: the two
+    beams beside a place, from where they looked, both reach past it."""
+    index = rng.integers(3, BEAMS - 4, count)
+    share = rng.random(count)
+    nearer = np.minimum(scan.ranges[index], scan.ranges[index + 1])
+    nearer = np.where(nearer > 0, np.minimum(nearer, 8.0), 0.0)
+    distance = nearer * rng.uniform(0.02, 0.9999, count)
+    bearing = FIRST + STEP * (index + share)
+    places = np.stack([np.cos(bearing), np.sin(bearing)], axis=1) * distance[:, None]
+    wrong = 0
+    true_bearings = FIRST + STEP * np.arange(BEAMS) + poses[:, 2]
+    inner = np.abs(index - BEAMS / 2) < 450
+    for place in places[distance > np.where(inner, 0.1, OWN)]:
+        away = place - poses[:, :2]
+        off = np.arctan2(away[:, 1], away[:, 0]) - true_bearings
+        before = np.flatnonzero((off[:-1] >= 0) & (off[1:] <= 0))
+        seen = TRUE[before] >= np.hypot(*away[before].T)
+        beside = TRUE[before + 1] >= np.hypot(*away[before + 1].T)
+        wrong += not (seen & beside).any()
+    return wrong
+
+
+TRUE = np.zeros(BEAMS)
+
+
+@pytest.mark.parametrize(("shift", "turn"), [(0.015, 0.0), (0.0, 0.02), (0.012, 0.015)])
+def test_nothing_is_proven_that_no_beam_saw(shift, turn):
+    rng = np.random.default_rng(round(1e4 * (shift + turn)))
+    scan, poses = swept(shift, turn, rng)
+    TRUE[:] = scan.ranges
+    assert unproven(steadied(scan, shift, turn), poses, rng) == 0
+    # without it edges stand where they do not
+    assert unproven(scan, poses, rng) > 0
+
+
+def test_who_stands_still_loses_a_step_beside_each_edge():
+    ranges = np.full(BEAMS, 5.0)
+    ranges[500:510] = 2.0
+    told = steadied(Scan(ranges, FIRST, STEP, 10.0, (0.0, 0.0, 0.0), 0.0), 0.0, 0.0)
+    assert np.flatnonzero(told.ranges == 2.0).tolist() == list(range(499, 511))
+    assert told.lost[[0, -1]].all()
+    assert told.lost.sum() == 2
+
+
+def test_a_lost_beam_is_lost_to_all_that_may_have_been_it():
+    ranges = np.full(BEAMS, 5.0)
+    ranges[500] = math.nan
+    told = steadied(Scan(ranges, FIRST, STEP, 10.0, (0.0, 0.0, 0.0), 0.0), 0.0, 2 * STEP)
+    assert np.flatnonzero(told.lost[10:-10]).tolist() == list(range(500 - 13, 500 - 6))
+
+
+def test_a_range_gets_shorter_by_what_the_sensor_moved_and_none_longer():
+    scan = Scan(np.full(BEAMS, 5.0), FIRST, STEP, 10.0, (0.0, 0.0, 0.0), 0.0)
+    told = steadied(scan, 0.01, 0.0)
+    assert told.ranges[20:-20] == pytest.approx(4.99)
+
+
+@pytest.mark.parametrize("bad", [-0.1, math.nan])
+def test_a_bound_that_is_none_is_refused(bad):
+    scan = Scan(np.full(BEAMS, 5.0), FIRST, STEP, 10.0, (0.0, 0.0, 0.0), 0.0)
+    with pytest.raises(ValueError, match="shift"):
+        steadied(scan, bad, 0.0)
+    with pytest.raises(ValueError, match="turn"):
+        steadied(scan, 0.0, bad)
