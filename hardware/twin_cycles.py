@@ -40,14 +40,6 @@ class Cycle:
     lidars: tuple[Counters, ...]
 
 
-NOTHING = Cycle(
-    at=float("-inf"), record=None, took=None, sent=None, goals_reached=0,
-    plan=np.zeros((0, 2), dtype=np.float32), seen=np.zeros((0, 2), dtype=np.float32),
-    worst_error=float("nan"), lidars=(),
-)  # fmt: skip
-"""Of a planner that has done nothing yet."""
-
-
 class CycleWriter:
     """Appends cycles. A process that is killed loses the one that it was about to write."""
 

@@ -6,29 +6,32 @@ pytest -m campaign.
 
 import json
 import math
+from argparse import Namespace
 from dataclasses import replace
+from types import SimpleNamespace
 
+import cv2
 import numpy as np
 import pytest
 
 pytest.importorskip("mujoco", reason="MuJoCo is not installed: pip install 'passpmp_ti[twin]'")
 
-from hardware import twin, twin_experiments, twin_faults, twin_page
+from hardware import drive, twin, twin_experiments, twin_faults, twin_page, twin_view
 from hardware.chair_model import ChairNature
 from hardware.executor import ADDRESS, Tick
 from hardware.letterbox import Letterbox
 from hardware.messages import Offer, decode
 from hardware.mujoco_chair import MujocoChair
 from hardware.status import Reason, State
-from hardware.twin_cycles import NOTHING, CycleReader, CycleWriter
+from hardware.twin_cycles import Cycle, CycleReader, CycleWriter
 from hardware.twin_experiments import EXPERIMENTS, LATE, TRIES, Job
 from hardware.twin_figures import chained, longest_stand, stops
 from hardware.twin_film import moment_at
 from hardware.twin_picture import HEAD, Picture
-from hardware.twin_planner import PlannerConfig
+from hardware.twin_planner import CYCLES, PlannerConfig
 from hardware.twin_process import TwinConfig, _obey
 from hardware.twin_settings import TOP_SPEED, executor_of, on_chair, settings_of
-from hardware.twin_wrong import STEP, WrongLink
+from hardware.twin_wrong import WrongLink
 from passpmp_ti.sim.drive import Drive
 from passpmp_ti.sim.episode import episode_of
 from passpmp_ti.sim.scenario import load_scenario
@@ -95,7 +98,11 @@ def test_the_chair_is_driven_no_faster_than_its_margins_are_for():
 
 
 def cycle(at, reached=0, plan=((0.0, 0.0), (1.0, 0.0))):
-    return replace(NOTHING, at=at, goals_reached=reached, plan=np.array(plan, dtype=np.float32))
+    return Cycle(
+        at=at, record=None, took=None, sent=None, goals_reached=reached,
+        plan=np.array(plan, dtype=np.float32), seen=np.zeros((0, 2), dtype=np.float32),
+        worst_error=math.nan, lidars=(),
+    )  # fmt: skip
 
 
 def test_what_is_written_is_read_once_and_a_torn_end_waits_for_its_rest(tmp_path):
@@ -130,18 +137,40 @@ def test_a_picture_shows_what_was_known_then():
     assert (image[HEAD:] != moved[HEAD:]).any()
 
 
+def test_without_a_window_the_live_picture_is_there_whole(tmp_path):
+    image = np.zeros((20, 30, 3), dtype=np.uint8)
+    image[:, :, 0] = 200  # red
+    twin_view._show(image, "", tmp_path)
+    assert [file.name for file in tmp_path.iterdir()] == ["live.png"]
+    assert (cv2.imread(str(tmp_path / "live.png"))[:, :, 2] == 200).all()
+
+
+def test_a_view_is_told_all_in_one_text(tmp_path):
+    told = twin_view.ViewConfig(
+        twin=TwinConfig(directory=tmp_path, scenario="corridor"), begin=1.5, folder="out"
+    )
+    assert twin_view.ViewConfig.from_json(told.to_json()) == told
+
+
+@pytest.mark.parametrize("option", ["video", "live"])
+def test_what_is_true_is_shown_of_the_twin_only(option):
+    given = {"config": "robot.yaml", "twin": None, "video": None, "live": None, option: "out"}
+    with pytest.raises(ValueError, match=f"--{option}"):
+        drive.run(Namespace(**given))
+
+
 def driven(speeds, step=0.05):
     """An episode of a chair that drives ahead at these speeds, a step each."""
     scenario, world, settings = on_the_chair("corridor")
     state = np.array([0.0, 0.0, 0.0, 0.0, 0.0])
-    drive = Drive(scenario, world, state, 100.0)
+    truth = Drive(scenario, world, state, 100.0)
     times = 100.0 + step * np.arange(len(speeds))
     x = np.concatenate([[0.0], np.cumsum(step * np.array(speeds[:-1]))])
     for n in range(1, len(speeds)):
         rows = [[x[m], 0.0, 0.0, speeds[m], speeds[m]] for m in (n - 1, n)]
-        drive.follow(times[n - 1 : n + 1], np.array(rows))
-    drive.update_times.append(0.01)
-    return episode_of(drive, settings, 0, times[len(times) // 2], False)
+        truth.follow(times[n - 1 : n + 1], np.array(rows))
+    truth.update_times.append(0.01)
+    return episode_of(truth, settings, 0, times[len(times) // 2], False)
 
 
 def test_a_chair_that_is_watched_to_rest_never_moves_for_more_than_all_the_time(tmp_path):
@@ -176,7 +205,10 @@ def test_stops_are_counted_as_they_begin_by_their_reason():
 # who dies is started again ---------------------------------------------------------------------
 
 
-def test_a_planner_that_died_is_followed_by_one_with_the_goals_that_are_left(monkeypatch):
+def test_a_planner_that_died_is_followed_by_one_with_the_goals_that_are_left(
+    monkeypatch, tmp_path
+):
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
     started = []
 
     class Planner:
@@ -190,14 +222,17 @@ def test_a_planner_that_died_is_followed_by_one_with_the_goals_that_are_left(mon
 
     monkeypatch.setattr(twin, "PlannerProcess", Planner)
     chain = twin.Chain("corridor", goals=((1.0, 0.0), (2.0, 0.0), (3.0, 0.0)))
-    chain.see = lambda: None
+    writer = CycleWriter(chain.directory / CYCLES)
+    chain.twin = SimpleNamespace(truth=lambda: np.zeros((0, 8)))
     chain.planner = chain.start_planner()
-    chain.cycles.append(cycle(1.0, reached=1))
+    writer.add(cycle(1.0, reached=1))
     chain.revive()
     assert started == [chain.goals, chain.goals[1:]]
     assert chain.goals_reached == 1
-    chain.cycles.append(cycle(2.0, reached=2))
+    writer.add(cycle(2.0, reached=2))
+    chain.see()
     assert chain.goals_reached == 3
+    writer.close()
     assert chain.revived == 1
 
 
@@ -347,8 +382,8 @@ def test_a_planner_told_to_go_wrong_does_until_it_is_told_otherwise(tmp_path):
         assert isinstance(right.body, Offer)
         rig.post(tmp_path / "planner-orders", b"nan")
         assert math.isnan(offered(link).body.trajectory.states[0, 3])
-        rig.post(tmp_path / "planner-orders", b"clock")
-        assert offered(link).sent_at == pytest.approx(right.sent_at + STEP, abs=5.0)
+        rig.post(tmp_path / "planner-orders", b"clock -100")
+        assert offered(link).sent_at == pytest.approx(right.sent_at - 100.0, abs=5.0)
         rig.post(tmp_path / "planner-orders", b"")
         last = offered(link)
         assert last.sent_at == pytest.approx(right.sent_at, abs=5.0)
