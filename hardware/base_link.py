@@ -157,6 +157,12 @@ def build(*, address: str, **limits: float) -> RemoteBase:
     """A remote base from plain values, as a configuration has them.
 
     Raises:
-        ValueError: a number out of its range.
+        ValueError: a number out of its range, or no directory where the server's socket should be.
     """
-    return RemoteBase(Path(address), BaseLimits(**limits))
+    here = Path(address)
+    if not here.parent.is_dir():
+        raise ValueError(
+            f"base.address = {address}: there is no {here.parent}; start what serves the base"
+            " first, as hardware/examples/serve_base.py does"
+        )
+    return RemoteBase(here, BaseLimits(**limits))

@@ -3,6 +3,7 @@ robot and on the twin."""
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
@@ -18,8 +19,8 @@ from hardware.status import State
 from passpmp_ti.planner.navigator import Navigator
 from passpmp_ti.scan import Scan
 
-NOWHERE: Pose = (0.0, 0.0, 0.0)
-"""A range finder's pose at a time of which nothing is known; such scans are dropped."""
+NOWHERE: Pose = (math.nan, math.nan, math.nan)
+"""A range finder's pose at a time of which nothing is known; no scan is made of it."""
 WAIT = 0.25
 """For scans that are due [s]."""
 ASK = 0.02
@@ -109,11 +110,7 @@ class PlannerLoop:
         while (left := until - time.monotonic()) > 0:
             read_together(self._clients, self._pairing, left)
             self._link.poll()
-        found = read_together(self._clients, self._pairing, WAIT)
-        arrived = time.monotonic()
-        if found is None or any(scan.pose == NOWHERE for scan in found):
-            return None, arrived
-        return found, arrived
+        return read_together(self._clients, self._pairing, WAIT), time.monotonic()
 
     def _state(self, when: float) -> np.ndarray | None:
         """The robot's at a time; its wheels stand where the executor says that it rests: what

@@ -5,19 +5,17 @@ from __future__ import annotations
 import math
 import os
 import tempfile
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from hardware.base import BaseLimits, check_fits
-from hardware.base_kinds import KINDS, BaseKind
+from hardware.config_parts import BaseConfig, Emulated, Lidar, Measured
 from hardware.executor_settings import ExecutorSettings
 from hardware.follower import FollowerSettings
-from hardware.margins import APART, deceleration, executor_settings, with_margins
+from hardware.margins import APART, HALF_SWEEP, executor_settings, with_margins
 from hardware.merge import check_stamp_error, needed_stamp_error
 from hardware.scip_settings import ScipSettings
-from passpmp_ti import door
 from passpmp_ti.robots import DifferentialDrive
 from passpmp_ti.settings import Settings
 
@@ -25,6 +23,8 @@ FOR_STEERING = 0.9
 """Share of the measured braking that may be planned with; the rest steers back to the plan."""
 RESERVE = 1.5
 """The executor lets the robot off its path by so much more than was ever measured."""
+BRISK = 2.0
+"""Wheels change their speed no more than so many times as fast as they were seen to brake."""
 LEAST_BOUND = 0.02
 """[m]; odometry itself has noise."""
 LOST_ODOMETRY = 3
@@ -33,107 +33,6 @@ FIELD_OF_VIEW = math.radians(270.0)
 """Of a UST-10LX; `HALF_SWEEP` is of such a device too."""
 MARGINS = ("tracking_error", "localisation_error", "range_noise", "stamp_error", "deadline")
 """Fields of `Settings` that come of what was measured."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Lidar:
-    """A range finder on the robot."""
-
-    name: str
-    """For people: "front", "rear"."""
-    scip: ScipSettings | None
-    """How it is reached; None: it is emulated."""
-    mount: tuple[float, float, float]
-    """(x, y, theta) on the robot, from midway between its driven wheels [m, m, rad]."""
-    range_max: float = 10.0
-    """How far it is believed [m]."""
-    range_noise: float = 0.04
-    """Greatest error of a range [m]; a UST-10LX's data sheet has 40 mm."""
-
-    def __post_init__(self) -> None:
-        door.array(f"lidar {self.name}", "mount", self.mount, (3,))
-        door.finite(f"lidar {self.name}", "range_max", self.range_max, above=0.0, unit="m")
-        door.finite(f"lidar {self.name}", "range_noise", self.range_noise, least=0.0, unit="m")
-
-    def pose(self, robot: Any) -> tuple[float, float, float]:
-        """(x, y, theta) in the world of the sensor on a robot at (x, y, theta, ...)."""
-        x, y, theta = (float(v) for v in robot[:3])
-        mx, my, turn = self.mount
-        c, s = math.cos(theta), math.sin(theta)
-        return x + c * mx - s * my, y + s * mx + c * my, theta + turn
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Measured:
-    """What somebody measured of the robot; docs/on-your-robot.md tells how. Each is the worst that
-    was seen on the worst floor, with the heaviest load, never a mean."""
-
-    braking_speed: float
-    """Speed at which it was told to stop [m/s]."""
-    braking_distance: float
-    """From where it was told to where it came to rest [m]."""
-    order_delay: float
-    """From an order to its effect [s]."""
-    wheel_lag: float = 0.05
-    """Time constant of the wheels' answer [s]."""
-    tracking_error: float
-    """Farthest off its path that it was [m]."""
-    rest_late: float = 0.1
-    """Longest that it rested after its path did [s]."""
-    localisation_error: float
-    """Greatest error of the told place [m]."""
-    heading_error: float
-    """Of the told heading [rad], and what it turns in half a sweep, 0.01 s, at its fastest."""
-
-    def __post_init__(self) -> None:
-        for above_0 in ("braking_speed", "braking_distance", "tracking_error", "rest_late"):
-            door.finite("measured", above_0, getattr(self, above_0), above=0.0)
-        for least_0 in ("order_delay", "wheel_lag", "localisation_error", "heading_error"):
-            door.finite("measured", least_0, getattr(self, least_0), least=0.0)
-
-    @property
-    def deceleration(self) -> float:
-        """How hard it brakes [m/s^2]."""
-        return deceleration(self.braking_speed, self.braking_distance)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class BaseConfig:
-    """What drives the robot."""
-
-    kind: str
-    """A name in `base_kinds.KINDS`."""
-    fields: Mapping[str, Any] = field(default_factory=dict)
-    """What that kind asks for."""
-    wheel_speed: float
-    """Greatest ground speed of a wheel [m/s]."""
-    command_timeout: float
-    """It brakes by itself when it was told nothing for this long [s]."""
-    runs_on: float
-    """The longest way on its last order that is put up with if the executor dies [m]."""
-    odometry_period: float = 0.01
-    """Time from one odometry to the next [s]."""
-
-    def __post_init__(self) -> None:
-        door.choice("base", "kind", self.kind, KINDS)
-        for above_0 in ("wheel_speed", "command_timeout", "runs_on", "odometry_period"):
-            door.finite("base", above_0, getattr(self, above_0), above=0.0)
-
-    @property
-    def made_by(self) -> BaseKind:
-        """Its kind."""
-        return KINDS[self.kind]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Emulated:
-    """A world that is none, for range finders without an address and a simulated base."""
-
-    scenario: str
-    """Its walls and movers: a shipped name, or a file."""
-    seed: int = 0
-    walls_known: bool = False
-    """The planner gets what stands there as a map; False: all that is seen may move."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -213,19 +112,32 @@ class DriveConfig:
         )
 
     @property
+    def heading_error(self) -> float:
+        """Greatest error of a range finder's heading [rad]: that of what is told, and what the
+        robot turned otherwise than its wheels said since."""
+        return self.measured.heading_error + 2.0 * self._unforeseen / self.robot.track
+
+    @property
+    def _unforeseen(self) -> float:
+        """What a wheel does otherwise than it did at the newest odometry, until the sweep's middle
+        or end [m]."""
+        # wheels may change faster than they surely brake: a measured distance has delays in it
+        change = BRISK * self.limits.acceleration
+        return 0.5 * change * (self.base.odometry_period + HALF_SWEEP) ** 2
+
+    @property
     def planner_settings(self) -> Settings:
-        """The planner's, with the margins of what was measured."""
+        """The planner's, with the margins of what was measured. What the robot moves and turns in a
+        sweep, and the error of its heading, is taken from the scans themselves (`steady.py`)."""
         m = self.measured
-        # a heading that is off moves what is far away the most
-        turned = m.heading_error * max(lidar.range_max for lidar in self.lidars)
         return with_margins(
             self.planner,
             self.executor_settings,
             cycle=self.planner.cycle,
-            localisation_error=m.localisation_error + turned,
+            localisation_error=m.localisation_error + self._unforeseen,
             range_noise=max(lidar.range_noise for lidar in self.lidars),
             scan_age=self.scan_age,
-            top_speed=self.robot.top_speed,
+            top_speed=0.0,
         )
 
     def base_options(self) -> dict[str, Any]:
@@ -279,21 +191,24 @@ class DriveConfig:
                 " there; measure at the speed that is planned with, or lower robot.wheel_speed"
             )
 
+    @property
+    def looks_all_round(self) -> bool:
+        """Whether every bearing is covered by a range finder."""
+        headings = [lidar.mount[2] for lidar in self.lidars]
+        # the middle between two of them, on the wide side, is where neither may look
+        apart = abs(math.remainder(headings[-1] - headings[0], math.tau))
+        return len(headings) > 1 and math.pi - 0.5 * apart < 0.5 * FIELD_OF_VIEW
+
     def _check_view(self) -> None:
         blind = self.planner.blind_speed
-        if blind is not None and blind < self.planner.object_speed:
+        if self.looks_all_round or (blind is not None and blind < self.planner.object_speed):
             return
-        half = 0.5 * FIELD_OF_VIEW
-        headings = [lidar.mount[2] for lidar in self.lidars]
-        # the middle between two range finders, and opposite to one, is where none looks
-        apart = abs(math.remainder(headings[-1] - headings[0], math.tau))
-        if len(headings) == 1 or math.pi - 0.5 * apart >= half:
-            raise ValueError(
-                "planner.blind_speed is missing: the range finders do not look all round, and out"
-                " of bearings that none covers anything may come, so the robot would never move;"
-                " add a second one behind, or bound what is there with planner.blind_speed and"
-                " planner.clear_radius (docs/add-a-sensor.md, blind sectors)"
-            )
+        raise ValueError(
+            "planner.blind_speed is missing: the range finders do not look all round, and out"
+            " of bearings that none covers anything may come, so the robot would never move;"
+            " add a second one behind, or bound what is there with planner.blind_speed and"
+            " planner.clear_radius (docs/add-a-sensor.md, blind sectors)"
+        )
 
 
 def usual_directory() -> Path:

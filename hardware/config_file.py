@@ -8,15 +8,8 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from hardware.base_kinds import KINDS
-from hardware.config import (
-    MARGINS,
-    BaseConfig,
-    DriveConfig,
-    Emulated,
-    Lidar,
-    Measured,
-    usual_directory,
-)
+from hardware.config import MARGINS, DriveConfig, usual_directory
+from hardware.config_parts import BaseConfig, Emulated, Lidar, Measured
 from hardware.scip import PORT
 from hardware.scip_settings import ScipSettings
 from passpmp_ti import door

@@ -102,7 +102,7 @@ def _on_robot(given: argparse.Namespace) -> int:
     if given.seconds is not None:
         seconds = door.finite("drive", "seconds", given.seconds, above=0.0, unit="s")
     _start(given.threads)
-    from hardware import on_robot
+    from hardware import driven, on_robot
     from hardware.priority import put_forward
 
     print("compiling, and waiting for the robot", file=sys.stderr)
@@ -110,16 +110,16 @@ def _on_robot(given: argparse.Namespace) -> int:
         with on_robot.RobotDrive(config, seed=given.seed) as drive:
             put_forward("the planner", PRIORITY)
             print("driving; Ctrl-C brings it to rest, a second one stops it", file=sys.stderr)
-            driven = drive.run(seconds, lambda look: print(on_robot.line(look), file=sys.stderr))
+            found = drive.run(seconds, lambda look: print(driven.line(look), file=sys.stderr))
     except RuntimeError as trouble:
         print(f"passpmp: {trouble}", file=sys.stderr)
         return FAILED
-    told = driven.summary()
-    print(on_robot.report(told))
+    told = found.summary()
+    print(driven.report(told))
     _write(given.out, told)
-    if driven.interrupted:
+    if found.interrupted:
         return INTERRUPTED
-    return 0 if driven.reached else FAILED
+    return 0 if found.reached else FAILED
 
 
 def _on_twin(given: argparse.Namespace) -> int:

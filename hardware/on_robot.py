@@ -4,14 +4,10 @@ from __future__ import annotations
 
 import json
 import math
-import signal
 import time
 from collections import Counter
-from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass
-from types import FrameType
-from typing import Any
+from collections.abc import Callable
+from contextlib import ExitStack
 
 import numpy as np
 
@@ -20,12 +16,15 @@ from hardware.chain import PlannerLoop, Round, poser
 from hardware.child import ended, started
 from hardware.complaints import advice
 from hardware.config import DriveConfig
-from hardware.emulated_process import BASE, EmulatedConfig, EmulatedProcess
+from hardware.devices import devices
+from hardware.driven import Driven, Look
 from hardware.executor_process import ExecutorConfig, ExecutorProcess, check_private
+from hardware.interrupts import Interrupts, interrupts
 from hardware.link import PlannerLink
-from hardware.scip_client import ScipClient, wait
-from hardware.scip_settings import ScipSettings
-from hardware.status import State, Status
+from hardware.scip_client import wait
+from hardware.scip_session import Unfit
+from hardware.status import State
+from hardware.steady import SteadyClient
 from hardware.stop_button import StopButton
 from passpmp_ti.grid.static_map import StaticMap
 from passpmp_ti.planner.navigator import Navigator
@@ -40,89 +39,8 @@ LOOK = 0.05
 LONGEST_REST = 20.0
 """[s] after which a robot that should have come to rest is stopped by the button."""
 
-
-@dataclass(frozen=True, slots=True)
-class Look:
-    """How it goes."""
-
-    time: float
-    """Since the drive began [s]."""
-    record: Any
-    """The navigator's last."""
-    away: float
-    """From the goal, by what is known [m]."""
-    speed: float
-    """[m/s]."""
-    status: Status | None
-    """The executor's."""
-    silent: tuple[str, ...]
-    """Range finders that are not heard, and why."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Driven:
-    """What a drive came to."""
-
-    name: str
-    reached: bool
-    interrupted: bool
-    """By Ctrl-C."""
-    why: str
-    """Why it ended."""
-    seconds: float
-    cycle: float
-    rounds: int
-    """Cycles."""
-    idle: int
-    """Those without a scan or a known pose, or while the robot braked."""
-    sent: int
-    """Trajectories."""
-    refused: int
-    """Of those that the executor judged."""
-    took: np.ndarray
-    """From a scan's arrival to the planner's answer, sent, each [s]."""
-    decisions: dict[str, int]
-    worst_error: float
-    """Farthest off its path, as the executor measured it [m]."""
-    lost: dict[str, int]
-    """Links lost, of each range finder."""
-
-    def summary(self) -> dict[str, Any]:
-        """In numbers, SI units."""
-        told: dict[str, Any] = {
-            key: getattr(self, key)
-            for key in (
-                "name", "reached", "interrupted", "why", "seconds", "cycle", "rounds", "idle",
-                "sent", "refused", "decisions", "lost",
-            )
-        }  # fmt: skip
-        told["worst_error"] = None if math.isnan(self.worst_error) else self.worst_error
-        for key, share in (("median", 0.5), ("p99", 0.99)):
-            told[f"took_{key}"] = float(np.quantile(self.took, share)) if len(self.took) else None
-        return told
-
-
-class Interrupts:
-    """Counts Ctrl-C (and SIGTERM) instead of dying of it."""
-
-    def __init__(self) -> None:
-        self.count = 0
-
-    def hear(self, number: int, frame: FrameType | None) -> None:
-        """One more."""
-        self.count += 1
-
-
-@contextmanager
-def interrupts() -> Iterator[Interrupts]:
-    """While this is open, Ctrl-C ends nothing by itself."""
-    heard = Interrupts()
-    before = {n: signal.signal(n, heard.hear) for n in (signal.SIGINT, signal.SIGTERM)}
-    try:
-        yield heard
-    finally:
-        for number, old in before.items():
-            signal.signal(number, old)
+STANDS = (State.RESTING, State.STOPPED, State.EMERGENCY)
+"""States in which nothing that the executor holds moves the robot."""
 
 
 class RobotDrive:
@@ -159,11 +77,11 @@ class RobotDrive:
         with ExitStack() as open_:
             config.directory.mkdir(mode=0o700, parents=True, exist_ok=True)
             check_private(config.directory)
-            settings, options = self._devices(open_)
+            settings, build, options = open_.enter_context(devices(config))
             self.executor = ExecutorProcess(
                 ExecutorConfig(
                     directory=config.directory,
-                    base=options.pop("base"),
+                    base=build,
                     base_options=options,
                     robot=config.robot,
                     settings=config.executor_settings,
@@ -178,7 +96,16 @@ class RobotDrive:
                     raise RuntimeError(f"the stop button did not start: {said!r}")
             self.link = open_.enter_context(PlannerLink(config.directory, track=config.robot.track))
             self.clients = [
-                open_.enter_context(ScipClient(one, pose_at=poser(self.link, lidar.pose)))
+                open_.enter_context(
+                    SteadyClient(
+                        one,
+                        state_at=self.link.state_at,
+                        pose_at=poser(self.link, lidar.pose),
+                        track=config.robot.track,
+                        arm=math.hypot(*lidar.mount[:2]),
+                        heading_error=config.heading_error,
+                    )
+                )
                 for one, lidar in zip(settings, config.lidars, strict=True)
             ]
             self._await_devices()
@@ -208,7 +135,11 @@ class RobotDrive:
         with interrupts() as heard:
             why = ""
             while not why:
-                rounds.append(loop.round())
+                try:
+                    rounds.append(loop.round())
+                except Unfit as cause:  # another device answers at that address now
+                    why = f"a range finder cannot do what its section asks: {cause}"
+                    break
                 if rounds[-1].took is not None:
                     decisions[self.navigator.record.decision] += 1
                 now = time.monotonic()
@@ -233,32 +164,6 @@ class RobotDrive:
                 for lidar, client in zip(self.config.lidars, self.clients, strict=True)
             },
         )  # fmt: skip
-
-    def _devices(self, open_: ExitStack) -> tuple[list[ScipSettings], dict[str, Any]]:
-        """Settings of the range finders; what the base is made with, and by what, as "base"."""
-        config = self.config
-        if config.emulated is None:
-            real = [lidar.scip for lidar in config.lidars if lidar.scip is not None]
-            return real, {"base": config.base.made_by.build, **config.base_options()}
-        devices = EmulatedProcess(
-            EmulatedConfig(
-                directory=config.directory,
-                scenario=config.emulated.scenario,
-                seed=config.emulated.seed,
-                mounts=tuple(lidar.mount for lidar in config.lidars),
-                # errors are cut at three deviations: what is declared holds
-                noise=min(lidar.range_noise for lidar in config.lidars) / 3.0,
-                limits=config.limits,
-            )
-        )
-        open_.callback(devices.close)
-        emulated = [
-            ScipSettings(host="127.0.0.1", port=port, range_max=lidar.range_max)
-            for port, lidar in zip(devices.ports, config.lidars, strict=True)
-        ]
-        limits = config.base_options()["limits"]
-        address = str(config.directory / BASE)
-        return emulated, {"base": "hardware.base_link:build", "address": address, **limits}
 
     def _await_devices(self) -> None:
         """Wait until all of them answer.
@@ -323,26 +228,27 @@ class RobotDrive:
 
     def _to_rest(self, why: str, heard: Interrupts) -> str:
         """Nothing more is planned: wait until the robot rests on what is held."""
-        began, already = time.monotonic(), heard.count
+        until = time.monotonic() + LONGEST_REST
         while self.executor.alive:
+            if heard.count > 1 or time.monotonic() > until:
+                return f"{why}; {self._press()}"
             self.link.poll(timeout=LOOK)
             status = self.link.status
-            if status is not None and status.state in (
-                State.RESTING, State.STOPPED, State.EMERGENCY,
-            ):  # fmt: skip
+            if status is not None and status.state in STANDS:
                 return why
-            late = time.monotonic() - began > LONGEST_REST
-            if late or heard.count > max(already, 1):
-                with StopButton(self.config.directory) as button:
-                    obeyed = button.press()
-                return (
-                    f"{why}; the emergency stop is pressed"
-                    + ("" if obeyed else ", and the executor does not obey")
-                    + f"; let go of it with python -m hardware.stop_button"
-                    f" {self.config.directory} --reset"
-                )
             time.sleep(LOOK)
         return why
+
+    def _press(self) -> str:
+        """Stop for good, and tell of it."""
+        directory = self.config.directory
+        with StopButton(directory) as button:
+            if not button.press():
+                return "the emergency stop was pressed, and the executor does not obey"
+        return (
+            "the emergency stop is pressed; let go of it with"
+            f" python -m hardware.stop_button {directory} --reset"
+        )
 
     def _look(self, since: float) -> Look:
         status = self.link.status
@@ -356,38 +262,6 @@ class RobotDrive:
             status=status,
             silent=self._silent(),
         )
-
-
-def line(look: Look) -> str:
-    """One line of progress, and one for each range finder that is silent."""
-    state = "silent" if look.status is None else look.status.state.name.lower()
-    told = (
-        f"t {look.time:6.1f} s   to goal {look.away:6.1f} m   speed {look.speed:6.2f} m/s  "
-        f" {look.record.decision:<8} {state:<12} {look.record.reason}"
-    )
-    return "\n".join([told.rstrip(), *look.silent])
-
-
-def report(told: dict[str, Any]) -> str:
-    """A drive's summary as text."""
-    took = [told[f"took_{share}"] for share in ("median", "p99")]
-    decisions = ", ".join(f"{name} {n}" for name, n in sorted(told["decisions"].items())) or "none"
-    error = told["worst_error"]
-    lost = ", ".join(f"{name} {n}" for name, n in told["lost"].items())
-    return (
-        f"\n{told['name']}: {told['why']}, after {told['seconds']:.1f} s\n"
-        f"cycles of {told['cycle']:g} s: {told['rounds']}, {told['idle']} of them without a scan or"
-        f" a known pose; decisions: {decisions}\n"
-        "scan's arrival to new trajectory: "
-        + (
-            "none"
-            if None in took
-            else f"median {1e3 * took[0]:.1f} ms, 99 % {1e3 * took[1]:.1f} ms"
-        )
-        + f"\ntrajectories: {told['sent']} sent, {told['refused']} refused; off its path by"
-        f" {'?' if error is None else f'{1e3 * error:.0f}'} mm at the most\n"
-        f"links lost: {lost}"
-    )
 
 
 def _known(config: DriveConfig) -> StaticMap | None:

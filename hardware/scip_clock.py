@@ -32,6 +32,11 @@ class DeviceClock:
         self._newest: int | None = None  # [ms], turns counted
         self._low = self._high = self._at = 0.0
 
+    @property
+    def width(self) -> float:
+        """How well the two clocks' difference was known when they were compared last [s]."""
+        return self._high - self._low
+
     def turned(self, reading: int) -> int:
         """A 24 bit reading with the turns before it counted [ms].
 

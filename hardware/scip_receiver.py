@@ -46,7 +46,8 @@ class Counters:
     unstable: int = 0
     """Sweeps that the device itself called so; it sends none."""
     unsure: int = 0
-    """Sweeps that could not be promised their stamp error; not handed out."""
+    """Sweeps that could not be promised their stamp error, or of which it is not known from where;
+    not handed out."""
     late: int = 0
     """Scans that were handed out, but had come late."""
     passed: int = 0
@@ -77,7 +78,8 @@ class Receiver:
             command: that is answered with these sweeps.
             clock: of the device; is told when sweeps came.
             counters: are counted on.
-            pose_at: the sensor's pose in the world at a time; None: (0, 0, 0).
+            pose_at: the sensor's pose in the world at a time, NaN where it is not known: such
+                scans are not handed out; None: (0, 0, 0).
         """
         self.doubts = False
         """Whether a sweep could not be promised its stamp error, since `clocks_compared`."""
@@ -132,10 +134,14 @@ class Receiver:
             counters.unsure += 1
             self.doubts = True
             return None
+        scan = self._scan(sweep, begin, end)
+        if scan is None:
+            counters.unsure += 1
+            return None
         self._stamp = end
         counters.scans += 1
         counters.late += int(at - end > self._settings.late)
-        return self._scan(sweep, begin, end)
+        return scan
 
     def _is_frozen(self, sweep: Sweep) -> bool:
         same = np.array_equal(sweep.distances, self._seen)
@@ -144,7 +150,8 @@ class Receiver:
         most = self._settings.frozen_after
         return most > 0 and self._same_in_row >= most
 
-    def _scan(self, sweep: Sweep, begin: float, end: float) -> Scan:
+    def _scan(self, sweep: Sweep, begin: float, end: float) -> Scan | None:
+        """None where it is not known from where."""
         settings, command, parameters = self._settings, self._command, self._parameters
         ranges = ranges_of(sweep.distances, parameters, settings.codes, settings.range_max)
         # a value stands for the middle of the steps that share it
@@ -153,12 +160,15 @@ class Receiver:
         high = parameters.angle(command.end - middle)
         if settings.upside_down:
             ranges, low = ranges[::-1], -high
+        # halfway through the sweep it is off by the least
+        pose = (0.0, 0.0, 0.0) if self._pose_at is None else self._pose_at(0.5 * (begin + end))
+        if not all(map(math.isfinite, pose)):
+            return None
         return Scan(
             ranges,
             angle_min=low,
             angle_increment=parameters.angle(command.cluster) - parameters.angle(0),
             range_max=settings.range_max,
-            # halfway through the sweep it is off by the least
-            pose=(0.0, 0.0, 0.0) if self._pose_at is None else self._pose_at(0.5 * (begin + end)),
+            pose=pose,
             stamp=end,
         )

@@ -67,6 +67,8 @@ class Session:
         self.version: dict[str, str] = {}
         self.state: dict[str, str] = {}
         self.parameters: Parameters | None = None
+        self.clock: DeviceClock | None = None
+        """The device's, once it is compared."""
         self.sweep: Sweep | None = None
         """The newest one, as it came."""
         self.since = math.inf
@@ -143,7 +145,7 @@ class Session:
         self.state = yield from self._ask_info("II")
         self.parameters = parameters
         command = self._fitting(parameters)
-        clock = DeviceClock(self._settings.drift)
+        clock = self.clock = DeviceClock(self._settings.drift)
         receiver = Receiver(
             self._settings, parameters, command, clock, self.counters, self._pose_at
         )

@@ -77,6 +77,7 @@ class Chain:
         goals: tuple[tuple[float, float], ...] | None = None,
         ahead: float = 0.0,
         obeys: bool = False,
+        keeps_scans: bool = False,
     ) -> None:
         """
         Args:
@@ -90,6 +91,7 @@ class Chain:
             goals: to be reached one after the other [m]; None: the scenario's.
             ahead: the scenario has gone on for so long when the chair begins [s].
             obeys: whether twin and planner can be told to go wrong.
+            keeps_scans: whether `cycles` have the scans that were planned on.
 
         Raises:
             ValueError: no such scenario, or one that no chair can drive.
@@ -106,7 +108,7 @@ class Chain:
         check_fits(self.limits, robot)
         self.robot, self.cycle = robot, cycle
         self.goals = self.scenario.goals if goals is None else goals
-        self._threads, self._obeys = threads, obeys
+        self._threads, self._obeys, self._keeps_scans = threads, obeys, keeps_scans
         self.world, state, _ = self.scenario.build(seed)
         self.settings = settings_of(self.scenario, self.world, cycle, self.config.nature())
         self.executor_settings = executor_of(cycle)
@@ -178,7 +180,7 @@ class Chain:
         return PlannerProcess(
             PlannerConfig(
                 twin=self.config, cycle=self.cycle, goals=left, threads=self._threads,
-                obeys=self._obeys,
+                obeys=self._obeys, keeps_scans=self._keeps_scans,
             )
         )  # fmt: skip
 

@@ -13,6 +13,7 @@ import numpy as np
 from hardware.chain import Sent
 from hardware.scip_receiver import Counters
 from passpmp_ti.planner.record import CycleRecord
+from passpmp_ti.scan import Scan
 
 LENGTH = struct.Struct("<I")
 """Stands before each cycle: its bytes."""
@@ -38,6 +39,10 @@ class Cycle:
     worst_error: float
     """Farthest off its path since the executor began, as that measured it [m]."""
     lidars: tuple[Counters, ...]
+    scans: tuple[Scan, ...] = ()
+    """What was planned on, where the planner was told to keep it."""
+    state: np.ndarray | None = None
+    """[5] the robot's then, as told, with the scans."""
 
 
 class CycleWriter:

@@ -63,6 +63,8 @@ class PlannerConfig:
     """Of its kernels; None: one for each core."""
     obeys: bool = False
     """Whether it can be told to go wrong, see `twin_wrong.py`."""
+    keeps_scans: bool = False
+    """Whether all that it planned on is written down."""
 
     def __post_init__(self) -> None:
         door.finite("twin", "cycle", self.cycle, above=0.05, unit="s")
@@ -170,7 +172,12 @@ def run(config: PlannerConfig, parent: int) -> None:
         cycles = CycleWriter(directory / CYCLES)
         open_.callback(cycles.close)
         while not leaving():
-            cycles.add(_cycle(loop.round(), navigator, link, clients))
+            done = loop.round()
+            cycle = _cycle(done, navigator, link, clients)
+            if config.keeps_scans and done.took is not None and done.scans is not None:
+                state = link.state_at(done.scans[0].stamp)
+                cycle = replace(cycle, scans=done.scans, state=state)
+            cycles.add(cycle)
 
 
 def _navigator(config: PlannerConfig) -> Navigator:

@@ -13,6 +13,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from hardware import doctor
 from hardware import drive as driving
 from passpmp_ti import door
 from passpmp_ti.bench import command
@@ -432,9 +433,18 @@ def _parser() -> argparse.ArgumentParser:
         _command(
             commands,
             "drive",
-            "drive a wheelchair through the whole chain: lidars, planner, executor, wheels",
+            "drive a robot, or a wheelchair in MuJoCo, through the whole chain, lidars to wheels",
             driving.run,
             driving.EXAMPLE,
+        )
+    )
+    doctor.add_options(
+        _command(
+            commands,
+            "doctor",
+            "say what is installed, reachable and fast enough",
+            doctor.run,
+            doctor.EXAMPLE,
         )
     )
 
