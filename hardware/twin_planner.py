@@ -148,6 +148,8 @@ def run(config: PlannerConfig, parent: int) -> None:
 
     for number in (signal.SIGTERM, signal.SIGINT):
         signal.signal(number, leave)
+    # from the start: one that takes another's place is to be ready soon; threads of kernels inherit
+    put_forward("the planner", PRIORITY)
     navigator = _navigator(config)
     os.write(sys.stdout.fileno(), READY)
     directory = config.twin.directory
@@ -166,8 +168,6 @@ def run(config: PlannerConfig, parent: int) -> None:
             open_.enter_context(client) for client in _clients(config, navigator, link, ports)
         ]
         check_stamp_error(navigator.settings, [c.settings for c in clients], APART)
-        # its kernels have threads of their own
-        put_forward("the planner", PRIORITY)
         loop = PlannerLoop(navigator, link, clients, cycle=config.cycle, apart=APART)
         cycles = CycleWriter(directory / CYCLES)
         open_.callback(cycles.close)
