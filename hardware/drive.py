@@ -137,11 +137,15 @@ def _on_twin(given: argparse.Namespace) -> int:
     )  # fmt: skip
     seconds = chain.scenario.duration if given.seconds is None else given.seconds
     door.finite("drive", "seconds", seconds, above=0.0, unit="s")
-    with contextlib.ExitStack() as open_:
-        open_.enter_context(chain)
-        if given.live is not None:
-            open_.callback(_shown(chain, given.live).close)
-        found = chain.run(seconds, lambda look: print(line(look), file=sys.stderr))
+    try:
+        with contextlib.ExitStack() as open_:
+            open_.enter_context(chain)
+            if given.live is not None:
+                open_.callback(_shown(chain, given.live).close)
+            found = chain.run(seconds, lambda look: print(line(look), file=sys.stderr))
+    except RuntimeError as trouble:
+        print(f"passpmp: {trouble}", file=sys.stderr)
+        return FAILED
     told = found.summary()
     print(report(told))
     _write(given.out, told)

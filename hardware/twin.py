@@ -23,7 +23,7 @@ from hardware.base import check_fits
 from hardware.chair_model import ChairNature
 from hardware.executor_process import ExecutorConfig, ExecutorProcess
 from hardware.status import State
-from hardware.twin_cycles import NOTHING, Cycle, CycleReader
+from hardware.twin_cycles import Cycle, CycleReader
 from hardware.twin_figures import Chained, chained, last_tick
 from hardware.twin_film import film
 from hardware.twin_picture import Picture
@@ -77,6 +77,7 @@ class Chain:
         goals: tuple[tuple[float, float], ...] | None = None,
         ahead: float = 0.0,
         obeys: bool = False,
+        keeps_scans: bool = False,
     ) -> None:
         """
         Args:
@@ -90,6 +91,7 @@ class Chain:
             goals: to be reached one after the other [m]; None: the scenario's.
             ahead: the scenario has gone on for so long when the chair begins [s].
             obeys: whether twin and planner can be told to go wrong.
+            keeps_scans: whether `cycles` have the scans that were planned on.
 
         Raises:
             ValueError: no such scenario, or one that no chair can drive.
@@ -106,7 +108,7 @@ class Chain:
         check_fits(self.limits, robot)
         self.robot, self.cycle = robot, cycle
         self.goals = self.scenario.goals if goals is None else goals
-        self._threads, self._obeys = threads, obeys
+        self._threads, self._obeys, self._keeps_scans = threads, obeys, keeps_scans
         self.world, state, _ = self.scenario.build(seed)
         self.settings = settings_of(self.scenario, self.world, cycle, self.config.nature())
         self.executor_settings = executor_of(cycle)
@@ -122,6 +124,7 @@ class Chain:
         self.revived = 0
         """Planners that were started because one had died."""
         self._goals_before = 0  # reached by planners that are gone
+        self._goals_now = 0  # by the one that there is
         self._heard = CycleReader(directory / CYCLES)
         self._open = ExitStack()
 
@@ -165,7 +168,7 @@ class Chain:
     @property
     def goals_reached(self) -> int:
         """How many of them, so far."""
-        return self._goals_before + (self.cycles[-1].goals_reached if self.cycles else 0)
+        return self._goals_before + self._goals_now
 
     def start_planner(self) -> PlannerProcess:
         """One for the goals that are left.
@@ -177,7 +180,7 @@ class Chain:
         return PlannerProcess(
             PlannerConfig(
                 twin=self.config, cycle=self.cycle, goals=left, threads=self._threads,
-                obeys=self._obeys,
+                obeys=self._obeys, keeps_scans=self._keeps_scans,
             )
         )  # fmt: skip
 
@@ -187,13 +190,10 @@ class Chain:
         Raises:
             RuntimeError: it did not start; says why.
         """
-        self.see()
         self.planner.close()
-        fresh = self.start_planner()
-        self.see()  # all that the old one wrote
-        self._goals_before = self.goals_reached
-        self.cycles.append(NOTHING)
-        self.planner = fresh
+        self.see()  # all that it wrote
+        self._goals_before, self._goals_now = self.goals_reached, 0
+        self.planner = self.start_planner()
         self.revived += 1
 
     def run(self, seconds: float, see: Callable[[Look], None] | None = None) -> Chained:
@@ -204,7 +204,8 @@ class Chain:
             see: is shown how it goes, about once a second.
 
         Raises:
-            RuntimeError: a planner that died could not be started again.
+            RuntimeError: twin or executor are gone, or a planner that died could not be started
+                again.
         """
         began = time.monotonic()
         told_at, reached_at = began, None
@@ -212,6 +213,9 @@ class Chain:
         try:
             while (now := time.monotonic()) < began + seconds:
                 time.sleep(PACE)
+                for name, process in (("twin", self.twin), ("executor", self.executor)):
+                    if not process.alive:
+                        raise RuntimeError(f"the {name} is gone: {process.close(1.0)}")
                 if not self.planner.alive:
                     self.revive()
                 self.see()
@@ -243,6 +247,7 @@ class Chain:
         """Take note of what was done, and of what really happened, since."""
         for cycle in self._heard.new():
             self.cycles.append(cycle)
+            self._goals_now = cycle.goals_reached
             if cycle.record is not None and cycle.took is not None:
                 self.drive.note(cycle.record, cycle.took)
         rows = self.twin.truth()

@@ -13,6 +13,7 @@ import numpy as np
 from hardware.chain import Sent
 from hardware.scip_receiver import Counters
 from passpmp_ti.planner.record import CycleRecord
+from passpmp_ti.scan import Scan
 
 LENGTH = struct.Struct("<I")
 """Stands before each cycle: its bytes."""
@@ -38,14 +39,10 @@ class Cycle:
     worst_error: float
     """Farthest off its path since the executor began, as that measured it [m]."""
     lidars: tuple[Counters, ...]
-
-
-NOTHING = Cycle(
-    at=float("-inf"), record=None, took=None, sent=None, goals_reached=0,
-    plan=np.zeros((0, 2), dtype=np.float32), seen=np.zeros((0, 2), dtype=np.float32),
-    worst_error=float("nan"), lidars=(),
-)  # fmt: skip
-"""Of a planner that has done nothing yet."""
+    scans: tuple[Scan, ...] = ()
+    """What was planned on, where the planner was told to keep it."""
+    state: np.ndarray | None = None
+    """[5] the robot's then, as told, with the scans."""
 
 
 class CycleWriter:

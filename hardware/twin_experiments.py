@@ -13,7 +13,7 @@ import argparse
 import sys
 import time
 from collections.abc import Generator, Iterable
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -117,6 +117,12 @@ def carry_out(job: Job, film: Path | None = None) -> Result:
     }  # fmt: skip
 
 
+def conditions() -> dict[str, Any]:
+    """What drives in one folder have in common."""
+    known = {f"{e.scenario}, {e.variant}": asdict(e) for e in EXPERIMENTS}
+    return {"tries": TRIES, "late": LATE, "scenarios": known}
+
+
 def jobs(runs: int, only: Iterable[str] = ()) -> list[Job]:
     """Seed by seed, so that a campaign that is stopped has some of each.
 
@@ -153,7 +159,7 @@ def main() -> int:
     given = parser.parse_args()
     try:
         wanted = jobs(door.whole("twin_experiments", "runs", given.runs, least=1), given.only)
-        ledger = Ledger(given.out, {"tries": TRIES, "late": LATE})
+        ledger = Ledger(given.out, conditions())
     except ValueError as error:
         print(error, file=sys.stderr)
         return 2

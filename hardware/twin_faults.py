@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import itertools
 import os
 import signal
 import sys
@@ -50,6 +51,8 @@ ROUNDS = 5
 """Faults of each kind before all processes are started anew."""
 LATELY = 60.0
 """Ticks of so long are looked at [s]."""
+STEP = 100.0
+"""By so much a clock is off [s]."""
 SWEEP = 0.025
 """Time of a turn of a lidar's mirror [s]."""
 
@@ -68,6 +71,7 @@ class TwinRig:
         )  # fmt: skip
         self.settings: ExecutorSettings = self.chain.executor_settings
         self.truth: list[Odometry] = []
+        self._steps = itertools.cycle((STEP, -STEP))
         self.late = 0.0
         """The twin's worst since this was set to 0 [s]."""
 
@@ -110,8 +114,12 @@ class TwinRig:
         self._orders.post(self.chain.directory / twin_process.ORDERS, wrong.encode())
 
     def planner(self, wrong: str) -> None:
-        """As `twin_wrong.WRONGS`."""
+        """As `twin_wrong.py` says."""
         self._orders.post(self.chain.directory / twin_wrong.ORDERS, wrong.encode())
+
+    def step_clock(self) -> None:
+        """The planner's, ahead and back in turn."""
+        self.planner(f"{twin_wrong.CLOCK} {next(self._steps):g}")
 
     def kill_planner(self) -> None:
         """It is gone at once."""
@@ -174,10 +182,10 @@ def kinds(settings: ExecutorSettings, period: float) -> list[Kind]:
         Kind("lidars rebooted", twin("reboot"), twin(""), told + SWEEP, False, stays=False),
         Kind("base's feedback lost", twin("silent"), twin(""),
              settings.feedback_timeout + hop, True),
-        Kind("planner's clock stepped", planner("clock"), planner(""), told, False),
+        Kind("planner's clock stepped", TwinRig.step_clock, planner(""), told, False),
         Kind("executor's link cut", lambda rig: rig.cut(cut=True),
              lambda rig: rig.cut(cut=False), hop, False),
-        Kind("numbers that are none", planner("nan"), planner(""), told, False),
+        Kind("numbers that are none", planner(twin_wrong.NAN), planner(""), told, False),
         Kind("emergency stop", TwinRig.press, TwinRig.release, hop, True),
     ]  # fmt: skip
 

@@ -70,12 +70,10 @@ def film(
         RuntimeError: no video can be written here.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
-    # planners that had nothing to tell yet have no time
-    told = [cycle for cycle in cycles if np.isfinite(cycle.at)]
     began, end = float(truth[0, 0]), float(truth[-1, 0])
     with VideoWriter(path, picture.size, RATE) as writer:
         for stamp in np.arange(began, end, STEP):
-            image = picture.of(moment_at(float(stamp), truth, told, goals, begin, began))
+            image = picture.of(moment_at(float(stamp), truth, cycles, goals, begin, began))
             writer.write(image)
         for _ in range(round(LINGER * RATE)):
             writer.write(image)

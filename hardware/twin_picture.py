@@ -79,7 +79,8 @@ class Picture:
         plot.star(np.asarray(moment.goal), 10, palette.GOAL)
         page = np.full((plot.sheet.shape[0] + HEAD, plot.sheet.shape[1], 3), palette.PAGE, np.uint8)
         page[HEAD:] = plot.sheet
-        speed = float(self._robot.speed(moment.state))
+        # a zero has no sign here
+        speed = round(float(self._robot.speed(moment.state)), 2) + 0.0
         text.draw(page, self._name, (8, 22), palette.INK, 19, weight=text.HEADING)
         text.draw(
             page, f"{moment.since:.1f} s, {speed:.2f} m/s   {moment.note}", (8, 46), palette.INK, 16

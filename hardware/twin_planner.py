@@ -63,6 +63,8 @@ class PlannerConfig:
     """Of its kernels; None: one for each core."""
     obeys: bool = False
     """Whether it can be told to go wrong, see `twin_wrong.py`."""
+    keeps_scans: bool = False
+    """Whether all that it planned on is written down."""
 
     def __post_init__(self) -> None:
         door.finite("twin", "cycle", self.cycle, above=0.05, unit="s")
@@ -146,6 +148,8 @@ def run(config: PlannerConfig, parent: int) -> None:
 
     for number in (signal.SIGTERM, signal.SIGINT):
         signal.signal(number, leave)
+    # from the start: one that takes another's place is to be ready soon; threads of kernels inherit
+    put_forward("the planner", PRIORITY)
     navigator = _navigator(config)
     os.write(sys.stdout.fileno(), READY)
     directory = config.twin.directory
@@ -164,13 +168,16 @@ def run(config: PlannerConfig, parent: int) -> None:
             open_.enter_context(client) for client in _clients(config, navigator, link, ports)
         ]
         check_stamp_error(navigator.settings, [c.settings for c in clients], APART)
-        # its kernels have threads of their own
-        put_forward("the planner", PRIORITY)
         loop = PlannerLoop(navigator, link, clients, cycle=config.cycle, apart=APART)
         cycles = CycleWriter(directory / CYCLES)
         open_.callback(cycles.close)
         while not leaving():
-            cycles.add(_cycle(loop.round(), navigator, link, clients))
+            done = loop.round()
+            cycle = _cycle(done, navigator, link, clients)
+            if config.keeps_scans and done.took is not None and done.scans is not None:
+                state = link.state_at(done.scans[0].stamp)
+                cycle = replace(cycle, scans=done.scans, state=state)
+            cycles.add(cycle)
 
 
 def _navigator(config: PlannerConfig) -> Navigator:

@@ -170,6 +170,11 @@ class TwinProcess:
         self.begin: float = heard["begin"]
         """The world's time is this much ahead of the clock's [s]."""
 
+    @property
+    def alive(self) -> bool:
+        """Whether it runs."""
+        return self.process.poll() is None
+
     def truth(self) -> np.ndarray:
         """[n, 8] what really was since the last call, as `TruthReader.new`."""
         return self._truth.new()

@@ -13,10 +13,9 @@ from passpmp_ti.trajectory import Trajectory
 
 ORDERS = "planner-orders"
 """Name of the socket by which a planner is told to go wrong."""
-WRONGS = ("", "nan", "clock")
-"""Right; trajectories with a number that is none; a clock that is off."""
-STEP = 100.0
-"""By so much a clock is off [s]."""
+NAN, CLOCK = "nan", "clock"
+"""Orders: trajectories with a number that is none; "clock 100": a clock that is off by so many
+seconds. Any other: go right."""
 
 
 class WrongLink(PlannerLink):
@@ -27,32 +26,32 @@ class WrongLink(PlannerLink):
         Args:
             directory: of the executor's sockets.
             track: distance between the driven wheels [m].
-            orders: where it is told how to go wrong, one of `WRONGS`.
+            orders: where it is told how to go wrong.
         """
-        self._wrong = ""
+        self._nan, self._step = False, 0.0
         self._orders = Letterbox(orders)
         super().__init__(directory, track=track, clock=self._now)
 
     def poll(self, timeout: float = 0.0) -> Status | None:
         # whatever is wrong, every cycle asks how it goes
         for order, _ in self._orders.collect():
-            self._wrong = order.decode()
+            what, _, by = order.decode().partition(" ")
+            self._nan, self._step = what == NAN, float(by) if what == CLOCK else 0.0
         return super().poll(timeout)
 
     def offer(self, trajectory: Trajectory) -> bool:
-        if self._wrong == "nan":
+        if self._nan:
             states = trajectory.states.copy()
             states[len(states) // 2, 3] = math.nan
             trajectory = Trajectory(trajectory.times, states, trajectory.brakes_from)
         return super().offer(trajectory)
 
     def beat(self, scan_stamp: float | None = None) -> None:
-        off = STEP if self._wrong == "clock" else 0.0
-        super().beat(None if scan_stamp is None else scan_stamp + off)
+        super().beat(None if scan_stamp is None else scan_stamp + self._step)
 
     def close(self) -> None:
         super().close()
         self._orders.close()
 
     def _now(self) -> float:
-        return time.monotonic() + (STEP if self._wrong == "clock" else 0.0)
+        return time.monotonic() + self._step
