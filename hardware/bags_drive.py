@@ -28,7 +28,6 @@ class DriveWriter:
         *,
         track: float,
         ahead: float,
-        lasts: float = 0.0,
         known: StaticMap | None = None,
     ) -> None:
         """
@@ -37,12 +36,11 @@ class DriveWriter:
             mounts: (x, y, theta) of each range finder on the robot.
             track: distance between the driven wheels [m].
             ahead: the wall clock's time less that of the scans' stamps [s].
-            lasts: a sweep, from its first beam to its last [s].
             known: what the planner was told of what stays.
         """
         self._known = known
         self._bag = BagWriter(path)
-        self._ahead, self._track, self._lasts = ahead, track, lasts
+        self._ahead, self._track = ahead, track
         self._frames = [f"laser_{n}" for n in range(len(mounts))]
         self._links = [("base_link", f, m) for f, m in zip(self._frames, mounts, strict=True)]
         self._begun = False
@@ -54,7 +52,10 @@ class DriveWriter:
         self._bag.close()
 
     def see(self, scans: Sequence[Scan], state: np.ndarray) -> None:
-        """Write what was planned on: the scans of one instant, and the robot's state [5] then."""
+        """Write what was planned on: the scans of one instant, and the robot's state [5] then.
+
+        They are told without a duration: `steady.py` has made of each sweep what one instant saw.
+        """
         stamp = scans[0].stamp + self._ahead
         if not self._begun:
             self._begun = True
@@ -67,8 +68,6 @@ class DriveWriter:
         tree = odometry_message(odometry, stamp, ODOM, "base_link", self._track)
         self._bag.write("/odom", ODOMETRY, tree, stamp)
         for n, (scan, frame) in enumerate(zip(scans, self._frames, strict=True)):
-            # a LaserScan has the stamp of its first beam, a Scan that of its last
-            first = scan.stamp + self._ahead - self._lasts
             topic = "/scan" if n == 0 else f"/scan_{n}"
-            tree = laser_scan(scan, first, frame, lasts=self._lasts)
+            tree = laser_scan(scan, stamp, frame)
             self._bag.write(topic, SCAN, tree, stamp)

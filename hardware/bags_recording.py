@@ -134,6 +134,7 @@ class Recording:
         beyond_is_free: bool = False,
         apart: float = 0.0135,
         moments: Callable[[float, float], tuple[float, float]] = lambda stamp, _: (stamp, stamp),
+        steadied: Callable[[Scan, np.ndarray, Pose], Scan] = lambda scan, state, mount: scan,
     ) -> Iterator[Instant]:
         """What was seen, in order.
 
@@ -142,6 +143,7 @@ class Recording:
             beyond_is_free: as for `sweep_of`.
             apart: stamps within an instant differ by this at the most [s].
             moments: as `RosSettings.moments`.
+            steadied: as `RosSettings.steadied`.
         """
         streams = {topic: n for n, topic in enumerate(_slashed(self.topics))}
         pairing = Pairing(len(streams), apart=apart)
@@ -159,7 +161,8 @@ class Recording:
                 if state is None or self.way.at(stamp) is None:
                     raise Untrusted("no pose of a scan's time")
                 x, y, theta = (float(v) for v in state[:3])
-                scan = sweep.at(compose((x, y, theta), self._mounted(sweep.frame)), stamp)
+                mount = self._mounted(sweep.frame)
+                scan = steadied(sweep.at(compose((x, y, theta), mount), stamp), state, mount)
             except ValueError as why:
                 self.trouble[str(why)] += 1
                 continue

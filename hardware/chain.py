@@ -52,6 +52,51 @@ class Round(NamedTuple):
     """None: nothing new."""
 
 
+class Planning:
+    """From scans of one instant to a trajectory at the executor, whoever brings the scans."""
+
+    def __init__(self, navigator: Navigator, slept: Callable[[], Slept] = asleep) -> None:
+        """
+        Args:
+            navigator: plans.
+            slept: tells for how long the machine has slept.
+        """
+        self._navigator = navigator
+        self._sleep = Sleep(slept)
+        self.slept = False
+        """Whether the machine was asleep since: memory speaks of the world before that, by a clock
+        that stood still, so nothing more is planned."""
+
+    def round(
+        self,
+        link: PlannerLink,
+        scans: tuple[Scan, ...] | None,
+        state: np.ndarray | None,
+        arrived: float,
+    ) -> Round:
+        """Plan a cycle, and send what was planned.
+
+        Args:
+            link: to the executor.
+            scans: of one instant; None: there are none.
+            state: [5] the robot's then; None: nobody knows.
+            arrived: when the scans were there [s].
+        """
+        self.slept = self.slept or self._sleep.woke()
+        if scans is None or state is None or not link.ready or self.slept:
+            return Round(scans, None, None)
+        answer = self._navigator.update(scans, state, following=link.following)
+        self.slept = self._sleep.woke()
+        if self.slept:
+            return Round(scans, None, None)
+        stamp = scans[0].stamp
+        link.beat(stamp)
+        sent = None
+        if link.offer(answer):
+            sent = Sent(stamp, arrived, time.monotonic(), answer.start)
+        return Round(scans, time.monotonic() - arrived, sent)
+
+
 class PlannerLoop:
     """Range finders, planner and the way to the executor; each `round` is a cycle."""
 
@@ -74,34 +119,24 @@ class PlannerLoop:
             apart: stamps of scans of one instant differ by this at the most [s].
             slept: tells for how long the machine has slept.
         """
-        self._navigator, self._link, self._clients = navigator, link, clients
+        self._link, self._clients = link, clients
         self._pairing = Pairing(len(clients), apart=apart)
         self._cycle = cycle
         self._due = time.monotonic()
-        self._sleep = Sleep(slept)
-        self.slept = False
-        """Whether the machine was asleep since: memory speaks of the world before that, by a clock
-        that stood still, so nothing more is planned."""
+        self._planning = Planning(navigator, slept)
+
+    @property
+    def slept(self) -> bool:
+        """As `Planning.slept`."""
+        return self._planning.slept
 
     def round(self) -> Round:
         """Wait until a cycle is due, plan it, and send what was planned."""
         scans, arrived = self._scans()
         self._due = max(self._due + self._cycle, time.monotonic() - self._cycle)
         self._link.poll(timeout=ASK)
-        state = None if scans is None else self._state(scans[0].stamp)
-        self.slept = self.slept or self._sleep.woke()
-        if scans is None or state is None or not self._link.ready or self.slept:
-            return Round(scans, None, None)
-        answer = self._navigator.update(scans, state, following=self._link.following)
-        self.slept = self._sleep.woke()
-        if self.slept:
-            return Round(scans, None, None)
-        stamp = scans[0].stamp
-        self._link.beat(stamp)
-        sent = None
-        if self._link.offer(answer):
-            sent = Sent(stamp, arrived, time.monotonic(), answer.start)
-        return Round(scans, time.monotonic() - arrived, sent)
+        state = None if scans is None else known_state(self._link, scans[0].stamp)
+        return self._planning.round(self._link, scans, state, arrived)
 
     def _scans(self) -> tuple[tuple[Scan, ...] | None, float]:
         """The first scans of one instant that come after a cycle is due, and when; those before are
@@ -112,13 +147,14 @@ class PlannerLoop:
             self._link.poll()
         return read_together(self._clients, self._pairing, WAIT), time.monotonic()
 
-    def _state(self, when: float) -> np.ndarray | None:
-        """The robot's at a time; its wheels stand where the executor says that it rests: what
-        they seem to turn then is noise."""
-        state, status = self._link.state_at(when), self._link.status
-        if state is not None and status is not None and status.state is State.RESTING:
-            state[3:] = 0.0
-        return state
+
+def known_state(link: PlannerLink, when: float) -> np.ndarray | None:
+    """[5] the robot's state at a time [s]; None where nobody knows. Its wheels stand where the
+    executor says that it rests: what they seem to turn then is noise."""
+    state, status = link.state_at(when), link.status
+    if state is not None and status is not None and status.state is State.RESTING:
+        state[3:] = 0.0
+    return state
 
 
 def poser(link: PlannerLink, of_robot: Callable[[np.ndarray], Pose]) -> Callable[[float], Pose]:

@@ -211,9 +211,13 @@ class DriveConfig:
         )
 
 
-def usual_directory() -> Path:
-    """Where the executor's sockets are unless the file says so."""
+def usual_directory(name: str = "passpmp") -> Path:
+    """Where the executor's sockets are unless the file says so.
+
+    Args:
+        name: of those who share it; there is one executor to a directory.
+    """
     runtime = os.environ.get("XDG_RUNTIME_DIR")
     if runtime:
-        return Path(runtime) / "passpmp"
-    return Path(tempfile.gettempdir()) / f"passpmp-{os.geteuid()}"
+        return Path(runtime) / name
+    return Path(tempfile.gettempdir()) / f"{name}-{os.geteuid()}"

@@ -12,11 +12,11 @@ from __future__ import annotations
 import argparse
 import signal
 import sys
-from pathlib import Path
 from types import FrameType
 from typing import Any
 
 from hardware.dds import DdsPort
+from hardware.ros_settings import RosSettings, read_parameters
 from passpmp_ti import door
 
 NODES = ("planner", "base", "twin")
@@ -48,8 +48,6 @@ def run(node: str, values: dict[str, Any], *, loopback: bool) -> None:
             backend.init("cpu", threads=1)
             RosTwin(port, RosTwinSettings.from_parameters(values)).run(leaving)
             return
-        from hardware.ros_settings import RosSettings
-
         settings = RosSettings.from_parameters(values)
         if node == "base":
             from hardware.ros_base import serve
@@ -72,12 +70,8 @@ def main() -> int:
     parser.add_argument("--config", metavar="FILE", help="what is set, as YAML (docs/ros.md)")
     parser.add_argument("--network", action="store_true", help="on all interfaces, not loopback")
     given = parser.parse_args()
-    import yaml
-
     try:
-        values = yaml.safe_load(Path(given.config).read_text()) if given.config else {}
-        if not isinstance(values, dict):
-            raise ValueError(f"{given.config}: must hold names and values; got {values!r}")
+        values = read_parameters(given.config) if given.config else {}
         run(door.choice("dds_node", "node", given.node, NODES), values, loopback=not given.network)
     except (ValueError, RuntimeError, OSError) as error:
         print(f"passpmp {given.node}: {error}", file=sys.stderr)

@@ -12,6 +12,7 @@ from collections.abc import Iterator
 from importlib import metadata
 from pathlib import Path
 
+from hardware import ros1
 from hardware.doctor_finding import FAIL, OK, WARN, Finding
 from hardware.letterbox import Letterbox
 from passpmp_ti import kernel_cache, probe
@@ -20,8 +21,8 @@ EXTRAS = {
     "twin": (("mujoco",), "pip install 'passpmp_ti[twin]' for drive --twin"),
     "bags": (("rosbags",), "pip install 'passpmp_ti[bags]' for recordings of ROS"),
     "ros": (
-        ("rospy", "sensor_msgs", "tf2_ros"),
-        "on Debian: apt-get install python3-rospy python3-sensor-msgs python3-tf2-ros; for ROS 1",
+        ("rospy", "sensor_msgs", "tf2_msgs"),
+        f"for ROS 1; on Debian: apt-get install --no-install-recommends {ros1.NEEDED}",
     ),
     "ros2": (("cyclonedds",), "pip install 'passpmp_ti[ros2]' for the topics of ROS 2"),
     "cluster": (("dask", "distributed"), "pip install 'passpmp_ti[cluster]' for compare on many"),
@@ -54,7 +55,9 @@ def machine() -> Iterator[Finding]:
 def extra(name: str) -> Finding:
     """Whether what an optional part needs is installed."""
     modules, remedy = EXTRAS[name]
-    missing = [module for module in modules if importlib.util.find_spec(module) is None]
+    # Debian's folder, where no environment looks, is looked in by the nodes of ROS 1 alone
+    there = ros1.there if name == "ros" else importlib.util.find_spec
+    missing = [module for module in modules if not there(module)]
     if missing:
         return Finding(f"extra {name}", WARN, f"{', '.join(missing)} not installed", remedy)
     return Finding(f"extra {name}", OK, "installed")

@@ -121,18 +121,9 @@ def _configured(
     given: argparse.Namespace, changes: Mapping[str, Any]
 ) -> tuple[RosSettings, dict[str, Any]]:
     """Settings as file and command line say, and the values that they are made of."""
-    import yaml
+    from hardware.ros_settings import RosSettings, read_parameters
 
-    from hardware.ros_settings import RosSettings
-
-    told: dict[str, Any] = {}
-    if given.config:
-        try:
-            told = yaml.safe_load(Path(given.config).read_text()) or {}
-        except yaml.YAMLError as error:
-            raise ValueError(f"{given.config}: cannot be read; {error}") from error
-        if not isinstance(told, dict):
-            raise ValueError(f"{given.config}: must hold names and values; got {told!r}")
+    told = read_parameters(given.config) if given.config else {}
     changed = dict(changes)
     changed["object_speed"] = given.object_speed
     for name in ("mode", "cycle", "object_speed"):
@@ -153,7 +144,7 @@ def _replay(given: argparse.Namespace, settings: RosSettings, recording: Recordi
     planner = settings.planner_settings().changed(deadline=None)
     instants = recording.instants(
         range_max=settings.range_max, beyond_is_free=settings.beyond_is_free,
-        apart=settings.apart, moments=settings.moments,
+        apart=settings.apart, moments=settings.moments, steadied=settings.steadied,
     )  # fmt: skip
     length = min(recording.way.times[-1], given.seconds)
     progress = Progress(float(length))

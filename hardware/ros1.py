@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-import importlib
+import importlib.util
 import os
 import signal
 import sys
 from collections.abc import Callable
+from importlib.machinery import PathFinder
 from pathlib import Path
 from types import FrameType, ModuleType
 from typing import Any
@@ -23,6 +24,11 @@ NEEDED = (
     " python3-rosbag python3-rostopic"
 )
 """Debian's packages for all that is done here."""
+
+
+def there(name: str) -> bool:
+    """Whether `load` would find a module. Nothing is loaded, and no path changed."""
+    return bool(importlib.util.find_spec(name) or PathFinder.find_spec(name, [str(DEBIAN)]))
 
 
 def load(name: str = "rospy") -> ModuleType:

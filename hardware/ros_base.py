@@ -18,6 +18,7 @@ from typing import Any
 
 from hardware.base import BaseLimits, Odometry, twist_of
 from hardware.base_link import BaseServer
+from hardware.executor_process import check_private
 from hardware.priority import put_forward
 from hardware.ros_clock import RosClock
 from hardware.ros_frames import Frames, compose
@@ -208,9 +209,14 @@ class ButtonKeeper:
 
 
 def serve(port: Port, settings: RosSettings, leave: Callable[[], bool]) -> None:
-    """Be the base of an executor in `settings.directory`, until `leave` says so."""
+    """Be the base of an executor in `settings.directory`, until `leave` says so.
+
+    Raises:
+        ValueError: others may enter that directory.
+    """
     directory = settings.directory
     directory.mkdir(mode=0o700, parents=True, exist_ok=True)
+    check_private(directory)
     times = RosClock(oldest=settings.oldest, skew=settings.skew)
     frames = Frames()
 

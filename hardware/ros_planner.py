@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 
 from hardware import ros_show
+from hardware.chain import Planning, known_state
 from hardware.executor_process import ExecutorConfig, ExecutorProcess
 from hardware.link import PlannerLink
 from hardware.merge import Pairing
@@ -49,6 +50,7 @@ from hardware.ros_port import (
     Port,
 )
 from hardware.ros_settings import RosSettings
+from hardware.sleep import Slept, asleep
 from hardware.status import State
 from passpmp_ti.grid.static_map import StaticMap
 from passpmp_ti.planner.navigator import Navigator
@@ -72,12 +74,15 @@ TELL = 1.0
 class Planner:
     """Hears scans, frames and goals; plans; shows what it does."""
 
-    def __init__(self, port: Port, settings: RosSettings) -> None:
+    def __init__(
+        self, port: Port, settings: RosSettings, *, slept: Callable[[], Slept] = asleep
+    ) -> None:
         """Compiles the kernels, which takes seconds.
 
         Args:
             port: to the middleware.
             settings: all of them.
+            slept: tells for how long the machine has slept.
 
         Raises:
             ValueError: settings that do not fit each other.
@@ -86,6 +91,7 @@ class Planner:
         self.navigator = Navigator(
             settings.robot, settings.planner_settings(), goal=(0.0, 0.0), seed=settings.seed
         )
+        self._planning = Planning(self.navigator, slept)
         self.unseen: Counter[str] = Counter()
         """Messages and cycles of which nothing could be made, by reason."""
         self.cycles = 0
@@ -120,7 +126,7 @@ class Planner:
         """Start an executor and drive, until `leave` says so.
 
         Raises:
-            RuntimeError: the executor did not start.
+            RuntimeError: the executor did not start, or ended; or the machine was asleep.
         """
         settings = self.settings
         config = ExecutorConfig(
@@ -143,6 +149,11 @@ class Planner:
                 if not executor.alive:
                     raise RuntimeError(f"the executor ended: {executor.close()}")
                 chosen = self.cycle(link, due)
+                if self._planning.slept:
+                    raise RuntimeError(
+                        "the machine was asleep, and what was seen before holds no more; start"
+                        " the node again"
+                    )
                 due = max(due + settings.cycle, time.monotonic() - settings.cycle)
                 now = time.monotonic()
                 if chosen is not None and now - shown_at >= settings.show_every:
@@ -169,14 +180,11 @@ class Planner:
         if scans is None:
             self._count("no scans of one instant came")
             return None
-        status, state = link.status, link.state_at(scans[0].stamp)
+        status, state = link.status, known_state(link, scans[0].stamp)
         if state is None or status is None or not link.ready or not self._frame:
             self._count("the executor tells of no motion to plan from")
             return None
-        if status.state is State.RESTING:
-            # what its wheels seem to turn then is noise
-            state[3:] = 0.0
-        elif not self._begun:
+        if status.state is not State.RESTING and not self._begun:
             self._count("the robot moves already")
             return None
         if not self._begun and self.settings.map:
@@ -185,12 +193,13 @@ class Planner:
                 return None
             self.navigator.static_map = self._map[1]
         self._aim(state)
-        answer = self.navigator.update(scans, state, following=link.following)
+        took = self._planning.round(link, scans, state, arrived).took
+        answer = self.navigator.held
+        if took is None or answer is None:
+            return None
         self._begun = True
         self.cycles += 1
-        link.beat(scans[0].stamp)
-        link.offer(answer)
-        self._lateness.append(time.monotonic() - arrived)
+        self._lateness.append(took)
         stamps = [self._times.theirs(float(t)) for t in ros_show.thinned(answer).times]
         self._plan(path(ros_show.thinned(answer), stamps, self._wall(), self._frame))
         return answer
@@ -232,7 +241,8 @@ class Planner:
             return None
         x, y, theta = (float(v) for v in state[:3])
         try:
-            return sweep.at(compose((x, y, theta), mount), stamp)
+            scan = sweep.at(compose((x, y, theta), mount), stamp)
+            return self.settings.steadied(scan, state, mount)
         except ValueError as why:
             self._count(str(why))
             return None
@@ -320,8 +330,6 @@ class Planner:
             sweep = sweep_of(
                 message, range_max=settings.range_max, beyond_is_free=settings.beyond_is_free
             )
-            if sweep.lasts > settings.sweep:
-                raise Untrusted(f"a sweep longer than sweep = {settings.sweep:g} s")
             stamp, middle = settings.moments(stamp, sweep.lasts)
             now = time.monotonic()
             if stamp > now + self._times.error:

@@ -3,24 +3,28 @@
 from __future__ import annotations
 
 import math
-import os
-import tempfile
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+import yaml
+
 from hardware.base import BaseLimits, check_fits
+from hardware.config import usual_directory
 from hardware.executor_settings import ExecutorSettings
 from hardware.follower import FollowerSettings
+from hardware.margins import APART, HASTE, executor_settings, with_margins
 from hardware.ros_clock import JUMP
+from hardware.ros_messages import Pose, Untrusted
+from hardware.steady import bounds, steadied
 from passpmp_ti import door
 from passpmp_ti.robots import DifferentialDrive
+from passpmp_ti.scan import Scan
 from passpmp_ti.settings import Settings
 
 STAMPED = ("any", "first")
-HASTE = 0.02
-"""What a cycle needs beside planning, from the scan's stamp to the executor [s]."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -60,11 +64,13 @@ class RosSettings:
     """How far the clocks of the machines that stamp may be off this one's [s]."""
     oldest: float = 0.5
     """Messages older than this are not believed [s]."""
-    apart: float = 0.0135
+    apart: float = APART
     """Stamps of several scans that are taken for one instant differ by this at the most [s]."""
     pose_error: float = 0.01
     """Greatest error of the robot's pose in the frame that is planned in [m]: with a map that of
     the localisation, else what the odometry errs by within the seconds that a plan lasts."""
+    heading_error: float = 0.01
+    """Likewise of its heading, and of how a range finder is mounted [rad]."""
     range_error: float = 0.04
     """Greatest error of a range [m]."""
 
@@ -81,12 +87,9 @@ class RosSettings:
     seed: int = 0
 
     # this machine
-    directory: Path = field(
-        default_factory=lambda: Path(
-            os.environ.get("XDG_RUNTIME_DIR", tempfile.gettempdir()), f"passpmp-{os.getuid()}"
-        )
-    )
-    """Of the sockets between planner, executor and base; who may enter it may drive."""
+    directory: Path = field(default_factory=lambda: usual_directory("passpmp-ros"))
+    """Of the sockets between planner, executor and base; who may enter it may drive. Not that of
+    `passpmp drive`: there is one executor to a directory."""
     backend: str = "cpu"
     threads: int | None = None
     """Of the planner's kernels; None: all cores."""
@@ -106,8 +109,16 @@ class RosSettings:
             "range_max", "sweep", "oldest", "cycle", "show_every", "show_cell", "show_reach",
         ):  # fmt: skip
             door.finite(name, above_0, getattr(self, above_0), above=0.0)
-        for least_0 in ("skew", "apart", "pose_error", "range_error", "object_speed"):
+        for least_0 in (
+            "skew", "apart", "pose_error", "heading_error", "range_error", "object_speed",
+        ):  # fmt: skip
             door.finite(name, least_0, getattr(self, least_0), least=0.0)
+        for own in ("mode", "cycle", "object_speed"):
+            if own in self.settings:
+                raise ValueError(
+                    f"{name}.settings: {own} has a field of its own, by which margins are reckoned;"
+                    f" set {name}.{own}"
+                )
         door.choice(name, "stamped", self.stamped, STAMPED)
         door.finite(name, "cycle", self.cycle, above=2 * HASTE, unit="s")
         door.whole(name, "seed", self.seed, least=0)
@@ -153,7 +164,12 @@ class RosSettings:
         Args:
             stamp: as the message has it.
             lasts: from its first beam to its last, as the message tells; 0 where it does not.
+
+        Raises:
+            Untrusted: a sweep longer than `sweep`.
         """
+        if lasts > self.sweep:
+            raise Untrusted(f"a sweep longer than sweep = {self.sweep:g} s")
         if self.stamped == "any":
             # no beam is a sweep older than that; those that are younger promise more than is taken
             return stamp, stamp
@@ -161,18 +177,32 @@ class RosSettings:
         lasts = lasts or self.sweep
         return stamp + lasts, stamp + 0.5 * lasts
 
+    def steadied(self, scan: Scan, state: np.ndarray, mount: Pose) -> Scan:
+        """What a sweep proves although the robot turned meanwhile, and nobody knows its heading
+        better than `heading_error`. What it rolled is in `Settings.localisation_error`.
+
+        Args:
+            scan: placed by `state`.
+            state: [5] the robot's when the sensor's place was asked for.
+            mount: of the range finder on the robot.
+        """
+        _, turning = bounds(float(state[3]), float(state[4]), self.robot.track)
+        turn = turning * self._astray
+        return steadied(scan, turn * math.hypot(*mount[:2]), turn + self.heading_error)
+
+    @property
+    def _astray(self) -> float:
+        """From a beam to the time at which its sensor's place is asked for, the middle of the sweep
+        where that is known, and what both stamps are off, at the most [s]."""
+        return self.sweep * (0.5 if self.stamped == "first" else 1.0) + self.skew + JUMP
+
     def executor_settings(self) -> ExecutorSettings:
-        """Whom the executor believes for how long: a cycle and a half, and some."""
-        patience = 1.5 * self.cycle + 0.15
-        own: dict[str, Any] = {
-            "planner_timeout": patience, "sensor_timeout": patience,
-            "ahead": max(2.0, 2 * self.cycle),
-        }  # fmt: skip
-        own |= self.executor
+        """The executor's: what suits the cycle, and `executor` on top."""
+        own = dict(self.executor)
         _check_names("executor.", own, [f.name for f in fields(ExecutorSettings)])
         if isinstance(own.get("follower"), Mapping):
             own["follower"] = FollowerSettings(**own["follower"])
-        return ExecutorSettings(**own)
+        return executor_settings(self.cycle, **own)
 
     def planner_settings(self) -> Settings:
         """The planner's, with the margins that range finders, clocks and executor ask for.
@@ -181,28 +211,23 @@ class RosSettings:
             ValueError: `settings` has less of a margin than they need.
         """
         executor = self.executor_settings()
-        # what the robot moves between a beam and the time at which the sensor's place is asked for,
-        # the middle of the sweep where that is known, and what both stamps are off
-        astray = self.sweep * (0.5 if self.stamped == "first" else 1.0) + self.skew + JUMP
-        shift = self.pose_error + self.robot.top_speed * astray
-        margins: dict[str, Any] = {
-            # what it moves away between two odometries is not seen
-            "tracking_error": executor.bound + 0.01,
-            "localisation_error": math.ceil(1000 * shift) / 1000,
-            "range_noise": self.range_error,
-            "stamp_error": self.scan_age + executor.rest_late,
-            "deadline": self.cycle - HASTE,
-        }
-        made = Settings.for_robot(
-            self.robot, mode=self.mode, cycle=self.cycle, object_speed=self.object_speed,
-            **(margins | dict(self.settings)),
-        )  # fmt: skip
+        needed = with_margins(
+            Settings.for_robot(self.robot, mode=self.mode, object_speed=self.object_speed),
+            executor,
+            cycle=self.cycle,
+            localisation_error=self.pose_error + self.robot.top_speed * self._astray,
+            range_noise=self.range_error,
+            scan_age=self.scan_age,
+            top_speed=0.0,  # what it rolls in a sweep is in already
+        )
+        made = needed.changed(**self.settings)
         for name in ("localisation_error", "range_noise"):
-            if getattr(made, name) < margins[name] - 1e-9:
+            told, least = getattr(made, name), getattr(needed, name)
+            if told < least:
                 raise ValueError(
-                    f"RosSettings.settings: {name} = {getattr(made, name):g} m is less than the"
-                    f" {margins[name]:g} m that pose_error, range_error and sweep ask for; leave"
-                    " it out, or lower those if they may be"
+                    f"RosSettings.settings: {name} = {told:g} m is less than the {least:g} m that"
+                    " pose_error, range_error and sweep ask for; leave it out, or lower those if"
+                    " they may be"
                 )
         if made.object_speed * self.scan_age >= made.object_width:
             raise ValueError(
@@ -212,6 +237,21 @@ class RosSettings:
             )
         executor.check_margins(made, scan_age=self.scan_age)
         return made
+
+
+def read_parameters(path: str | Path) -> dict[str, Any]:
+    """Names and values from a YAML file.
+
+    Raises:
+        ValueError: it cannot be read, or holds something else.
+    """
+    try:
+        told = yaml.safe_load(Path(path).read_text())
+    except (OSError, UnicodeDecodeError, yaml.YAMLError) as cause:
+        raise ValueError(f"{path}: cannot be read; {cause}") from cause
+    if told is not None and not isinstance(told, dict):
+        raise ValueError(f"{path}: must hold names and values; got {told!r}")
+    return told or {}
 
 
 def _mapping(name: str, value: object) -> Mapping[str, Any]:

@@ -28,6 +28,18 @@ SPEED_ERROR = 0.05
 """And by this [m/s]: noise, and what changes within half a sweep."""
 
 
+def bounds(right: float, left: float, track: float) -> tuple[float, float]:
+    """How fast a robot may really roll [m/s] and turn [rad/s] whose wheels tell these speeds.
+
+    Args:
+        right: ground speed of the right wheel [m/s].
+        left: of the left one [m/s].
+        track: distance between them [m].
+    """
+    rolling = BELIEVED * 0.5 * abs(right + left) + SPEED_ERROR
+    return rolling, (BELIEVED * abs(right - left) + SPEED_ERROR) / track
+
+
 def steadied(scan: Scan, shift: float, turn: float) -> Scan:
     """What a sweep proves for a sensor that stands at the scan's pose.
 
@@ -43,7 +55,7 @@ def steadied(scan: Scan, shift: float, turn: float) -> Scan:
 
     Returns:
         The scan with ranges that are never longer. Beams at both ends, past which nobody may have
-        looked, are lost.
+        looked, are lost; a scan of a whole turn has no ends.
 
     Raises:
         ValueError: a bound that is negative or no number.
@@ -57,11 +69,19 @@ def steadied(scan: Scan, shift: float, turn: float) -> Scan:
     sideways[lost | (shift == 0.0)] = 0.0
     # up, and a step more: every rounding widens
     reach = np.ceil((turn + sideways) / scan.angle_increment).astype(np.int64) + 1
+    around = 0
+    if abs(len(nearer) * scan.angle_increment - math.tau) <= scan.angle_increment:
+        # first and last may look along one bearing: counted from one to the other, a step is lost
+        reach += 1
+        around = min(int(reach.max()), len(nearer))
+        nearer, reach = np.pad(nearer, around, "wrap"), np.pad(reach, around, "wrap")
     told = nearer.copy()
     for off in range(1, min(int(reach.max()), len(told) - 1) + 1):
         spread = np.where(reach >= off, nearer, np.inf)
         np.minimum(told[off:], spread[:-off], out=told[off:])
         np.minimum(told[:-off], spread[off:], out=told[:-off])
+    if around:
+        return replace(scan, ranges=told[around:-around])
     beside = turn + math.asin(min(shift / OWN, 1.0))
     ends = math.ceil(beside / scan.angle_increment) + 1
     told[:ends] = told[-ends:] = 0.0
@@ -103,9 +123,7 @@ class SteadyClient(ScipClient):
         state = self._state_at(scan.stamp - half)
         if state is None:
             return replace(scan, ranges=np.full_like(scan.ranges, math.nan))
-        right, left = (float(v) for v in state[3:])
-        rolling = BELIEVED * 0.5 * abs(right + left) + SPEED_ERROR
-        turning = (BELIEVED * abs(right - left) + SPEED_ERROR) / self._track
+        rolling, turning = bounds(float(state[3]), float(state[4]), self._track)
         return steadied(
             scan, half * (rolling + turning * self._arm), half * turning + self._heading_error
         )

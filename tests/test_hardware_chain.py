@@ -59,11 +59,11 @@ class Head:
 
 @pytest.fixture
 def loop():
-    slept = [5.0]
+    slept, head, legs = [5.0], Head(), Legs()
     made = PlannerLoop(
-        Head(), Legs(), [Eyes()], cycle=0.02, apart=0.0, slept=lambda: (slept[0], slept[0])
+        head, legs, [Eyes()], cycle=0.02, apart=0.0, slept=lambda: (slept[0], slept[0])
     )
-    return made, made._navigator, made._link, slept
+    return made, head, legs, slept
 
 
 def test_a_round_is_a_scan_a_plan_and_its_way(loop):
