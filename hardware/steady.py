@@ -20,6 +20,9 @@ from hardware.scip_settings import ScipSettings
 from passpmp_ti import door
 from passpmp_ti.scan import Scan
 
+EDGE = 0.3
+"""A beam that would tell so much less than it saw [m] looks past an edge: it is lost rather than
+met by what it may not have met."""
 OWN = 0.3
 """At both ends of a sweep all that is nearer than this is the robot's own body [m]."""
 BELIEVED = 1.25
@@ -55,7 +58,8 @@ def steadied(scan: Scan, shift: float, turn: float) -> Scan:
 
     Returns:
         The scan with ranges that are never longer. Beams at both ends, past which nobody may have
-        looked, are lost; a scan of a whole turn has no ends.
+        looked, are lost, and those that may have looked past an edge: a return there would stand
+        where nothing stands. A scan of a whole turn has no ends.
 
     Raises:
         ValueError: a bound that is negative or no number.
@@ -80,6 +84,9 @@ def steadied(scan: Scan, shift: float, turn: float) -> Scan:
         spread = np.where(reach >= off, nearer, np.inf)
         np.minimum(told[off:], spread[:-off], out=told[off:])
         np.minimum(told[:-off], spread[off:], out=told[:-off])
+    # Among the beams about a lost one, what it would have told is never nearer than both that are
+    # left: who spreads over it spreads over one of them as well.
+    told[told < nearer - EDGE] = 0.0
     if around:
         return replace(scan, ranges=told[around:-around])
     beside = turn + math.asin(min(shift / OWN, 1.0))

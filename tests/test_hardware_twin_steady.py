@@ -49,14 +49,18 @@ def swept(shift, turn, rng):
 
 
 def unproven(scan, poses, rng, count=4000):
-    """How many of random places that a scan proves empty no beam of the sweep proved so: the two
-    beams beside a place, from where they looked, both reach past it."""
-    index = rng.integers(3, BEAMS - 4, count)
-    share = rng.random(count)
-    nearer = np.minimum(scan.ranges[index], scan.ranges[index + 1])
-    nearer = np.where(nearer > 0, np.minimum(nearer, 8.0), 0.0)
+    """How many of random places that a scan proves empty no beams of the sweep proved so: two that
+    are beside a place, from where they looked, and both reach past it."""
+    # lost beams are skipped: the wedge between those beside them is proven to the nearer one
+    kept = np.flatnonzero(~scan.lost)
+    wedge = rng.integers(0, len(kept) - 1, count)
+    before, after = kept[wedge], kept[wedge + 1]
+    nearer = np.minimum(np.minimum(scan.ranges[before], scan.ranges[after]), 8.0)
+    # and no farther than an object is wide
+    nearer = np.minimum(nearer, 0.4 / (STEP * (after - before)))
     distance = nearer * rng.uniform(0.02, 0.9999, count)
-    bearing = FIRST + STEP * (index + share)
+    index = before + rng.random(count) * (after - before)
+    bearing = FIRST + STEP * index
     places = np.stack([np.cos(bearing), np.sin(bearing)], axis=1) * distance[:, None]
     wrong = 0
     true_bearings = FIRST + STEP * np.arange(BEAMS) + poses[:, 2]
@@ -84,13 +88,22 @@ def test_nothing_is_proven_that_no_beam_saw(shift, turn):
     assert unproven(scan, poses, rng) > 0
 
 
-def test_who_stands_still_loses_a_step_beside_each_edge():
+def test_who_stands_still_loses_a_beam_beside_each_edge():
     ranges = np.full(BEAMS, 5.0)
     ranges[500:510] = 2.0
     told = steadied(Scan(ranges, FIRST, STEP, 10.0, (0.0, 0.0, 0.0), 0.0), 0.0, 0.0)
-    assert np.flatnonzero(told.ranges == 2.0).tolist() == list(range(499, 511))
-    assert told.lost[[0, -1]].all()
-    assert told.lost.sum() == 2
+    assert np.flatnonzero(told.ranges == 2.0).tolist() == list(range(500, 510))
+    assert np.flatnonzero(told.lost).tolist() == [0, 499, 510, BEAMS - 1]
+
+
+def test_what_stands_is_not_seen_where_it_does_not_stand():
+    # a turn spreads what a beam met over its neighbours: as returns, they would tell of somebody
+    # where the scan before had proven that nobody is
+    ranges = np.full(BEAMS, 5.0)
+    ranges[500:510] = 2.0
+    told = steadied(Scan(ranges, FIRST, STEP, 10.0, (0.0, 0.0, 0.0), 0.0), 0.0, 0.03)
+    assert np.flatnonzero(told.ranges == 2.0).tolist() == list(range(500, 510))
+    assert told.lost[480:500].sum() == told.lost[510:530].sum() == 8
 
 
 def test_a_lost_beam_is_lost_to_all_that_may_have_been_it():
