@@ -9,18 +9,25 @@ import io
 import json
 import math
 import sys
+import time
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from passpmp_ti import door
 
 if TYPE_CHECKING:
+    from hardware.bags_drive import DriveWriter
+    from hardware.ros_messages import Pose
     from hardware.twin import Chain, Look
+    from hardware.twin_cycles import Cycle
     from hardware.twin_view import View
+    from passpmp_ti.grid.static_map import StaticMap
 
 EXAMPLE = """passpmp drive hardware/examples/emulated.yaml
   passpmp drive --twin corridor_person --cycle 0.1
-  passpmp drive --twin dead_end --seed 3 --video out/dead_end.mp4 --live out/live"""
+  passpmp drive --twin dead_end --seed 3 --video out/dead_end.mp4 --live out/live
+  passpmp drive --twin corridor_person --cycle 0.1 --bag out/drive.bag"""
 FAILED, INTERRUPTED = 1, 130
 """Exit codes: something touched the twin while it moved, or a robot did not get to its goal;
 Ctrl-C."""
@@ -62,6 +69,11 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     )
     add("--threads", type=int, metavar="K", help="of the planner's kernels (default: all cores)")
     add("--out", metavar="FILE", help="write the summary here, as JSON")
+    add(
+        "--bag",
+        metavar="FILE",
+        help="record scans, odometry and map: a .bag of ROS 1, or an .mcap; for passpmp replay",
+    )
     add("--video", metavar="FILE", help="with --twin: draw the drive when it is over")
     add(
         "--live",
@@ -107,10 +119,20 @@ def _on_robot(given: argparse.Namespace) -> int:
 
     print("compiling, and waiting for the robot", file=sys.stderr)
     try:
-        with on_robot.RobotDrive(config, seed=given.seed) as drive:
+        with contextlib.ExitStack() as open_:
+            drive = on_robot.RobotDrive(config, seed=given.seed)
+            record = None
+            if given.bag is not None:
+                mounts = [lidar.mount for lidar in config.lidars]
+                known = drive.navigator.static_map
+                bag = _recorder(given.bag, mounts, config.robot.track, known)
+                record = open_.enter_context(bag).see
+            open_.enter_context(drive)
             put_forward("the planner", PRIORITY)
             print("driving; Ctrl-C brings it to rest, a second one stops it", file=sys.stderr)
-            found = drive.run(seconds, lambda look: print(driven.line(look), file=sys.stderr))
+            found = drive.run(
+                seconds, lambda look: print(driven.line(look), file=sys.stderr), record
+            )
     except RuntimeError as trouble:
         print(f"passpmp: {trouble}", file=sys.stderr)
         return FAILED
@@ -133,12 +155,20 @@ def _on_twin(given: argparse.Namespace) -> int:
     cycle = CYCLE if given.cycle is None else given.cycle
     chain = Chain(
         given.twin, seed=given.seed, cycle=cycle, object_speed=given.object_speed,
-        threads=given.threads,
+        threads=given.threads, keeps_scans=given.bag is not None,
     )  # fmt: skip
     seconds = chain.scenario.duration if given.seconds is None else given.seconds
     door.finite("drive", "seconds", seconds, above=0.0, unit="s")
     try:
         with contextlib.ExitStack() as open_:
+            if given.bag is not None:
+                from hardware.twin_planner import known_map
+
+                mounts = [lidar.mount for lidar in chain.scenario.lidars]
+                known = known_map(chain.scenario, chain.world)
+                bag = _recorder(given.bag, mounts, chain.robot.track, known)
+                # when the drive is over, however it ended: writing takes time from nobody
+                open_.callback(_record, chain.cycles, open_.enter_context(bag))
             open_.enter_context(chain)
             if given.live is not None:
                 open_.callback(_shown(chain, given.live).close)
@@ -154,6 +184,21 @@ def _on_twin(given: argparse.Namespace) -> int:
     if told["interrupted"]:
         return INTERRUPTED
     return FAILED if told["collisions_moving"] else 0
+
+
+def _recorder(
+    path: str, mounts: Sequence[Pose], track: float, known: StaticMap | None
+) -> DriveWriter:
+    from hardware.bags_drive import DriveWriter
+
+    ahead = time.time() - time.monotonic()
+    return DriveWriter(path, mounts, track=track, ahead=ahead, known=known)
+
+
+def _record(cycles: Iterable[Cycle], bag: DriveWriter) -> None:
+    for cycle in cycles:
+        if cycle.state is not None:
+            bag.see(cycle.scans, cycle.state)
 
 
 def _shown(chain: Chain, folder: str) -> View:

@@ -29,6 +29,7 @@ from hardware.steady import SteadyClient
 from hardware.stop_button import StopButton
 from passpmp_ti.grid.static_map import StaticMap
 from passpmp_ti.planner.navigator import Navigator
+from passpmp_ti.scan import Scan
 from passpmp_ti.sim.scenario import load_scenario
 
 START = 10.0
@@ -117,7 +118,12 @@ class RobotDrive:
     def __exit__(self, *_: object) -> None:
         self._open.close()
 
-    def run(self, seconds: float = math.inf, see: Callable[[Look], None] | None = None) -> Driven:
+    def run(
+        self,
+        seconds: float = math.inf,
+        see: Callable[[Look], None] | None = None,
+        record: Callable[[tuple[Scan, ...], np.ndarray], None] | None = None,
+    ) -> Driven:
         """Drive until the last goal is reached, the time is over, or Ctrl-C.
 
         The first Ctrl-C lets the robot come to rest on what it holds, as the end of the time does;
@@ -126,6 +132,8 @@ class RobotDrive:
         Args:
             seconds: longest [s].
             see: is shown how it goes, about once a second.
+            record: is shown what each cycle planned on, scans and the robot's state [5] then, once
+                the answer is sent.
         """
         loop = PlannerLoop(
             self.navigator, self.link, self.clients,
@@ -148,6 +156,10 @@ class RobotDrive:
                 if done.took is not None:
                     took.append(done.took)
                     decisions[self.navigator.record.decision] += 1
+                    if record is not None and done.scans is not None:
+                        state = self.link.state_at(done.scans[0].stamp)
+                        if state is not None:
+                            record(done.scans, state)
                 now = time.monotonic()
                 why = self._ends(loop, heard, now - began, seconds)
                 if see is not None and now - told_at >= TELL:
