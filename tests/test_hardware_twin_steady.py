@@ -106,6 +106,26 @@ def test_what_stands_is_not_seen_where_it_does_not_stand():
     assert told.lost[480:500].sum() == told.lost[510:530].sum() == 8
 
 
+def test_a_scan_of_a_whole_turn_has_no_ends_and_its_seam_is_as_any_other_place():
+    n = 360
+    ranges = np.full(n, 5.0)
+    ranges[100:110] = 2.0
+    for beams in (n, n + 1):  # the last may look where the first does
+        told = []
+        for off in (0, 255):  # the near ones in the middle, and across the seam
+            rolled = np.roll(ranges, off)
+            given = np.concatenate([rolled, rolled[: beams - n]])
+            scan = Scan(given, 0.0, math.tau / n, 10.0, (0.0, 0.0, 0.0), 0.0)
+            found = steadied(scan, 0.0, 0.03).ranges[:n]
+            told.append(np.roll(found, -off))
+        middle, seam = told
+        lost = np.flatnonzero(middle == 0.0)
+        # two beams of turn, one in between, and one more for the seam
+        assert lost.tolist() == [*range(96, 100), *range(110, 114)]
+        assert (seam <= middle).all()
+        assert (seam[[90, 120]] == 5.0).all()
+
+
 def test_a_lost_beam_is_lost_to_all_that_may_have_been_it():
     ranges = np.full(BEAMS, 5.0)
     ranges[500] = math.nan
