@@ -341,7 +341,7 @@ def run_of(**changes):
 def test_faults_that_failed_are_on_the_page_those_of_disturbed_runs_too():
     again = [{"late": 1.0, "failure": "late", "touched": 2}]
     told = twin_page.faults([run_of(), run_of(seed=1, failure="it moved", disturbed=again)])
-    assert "| planner killed | 2 | 1 | 0 | 1.00, 1.00 | 0.50 | 3.00, 3.00 |" in told
+    assert "| planner killed | 0.03 | 2 | 1 | 0 | 1.00, 1.00 | 0.50 | 3.00, 3.00 |" in told
     assert "- planner killed 1: it moved" in told
     assert "1 runs in which the twin was late" in told
     assert "1 of those failed, with 2 contacts" in told
