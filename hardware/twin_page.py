@@ -104,7 +104,8 @@ def faults(found: Iterable[Result]) -> str:
         rested = [f for f in these if math.isfinite(f["took"])]
         took, back = [f["took"] for f in rested], [f["back"] for f in rested]
         rows.append([
-            name, f"{noticed[name]:.2f}", str(len(these)), str(sum(bool(f["failure"]) for f in these)),
+            name, f"{noticed[name]:.2f}", str(len(these)),
+            str(sum(bool(f["failure"]) for f in these)),
             str(sum(f["touched"] for f in these)),
             f"{np.median(took):.2f}, {max(took):.2f}" if rested else "-",
             f"{min(f['allowed'] - f['took'] for f in rested):.2f}" if rested else "-",
@@ -116,8 +117,8 @@ def faults(found: Iterable[Result]) -> str:
     return "\n\n".join([
         FAULTS_HEAD.strip(),
         _table(
-            ["fault", "noticed after [s]", "runs", "failed", "touched", "to rest: median, longest [s]",
-             "least to spare [s]", "drives again after: median, longest [s]"],
+            ["fault", "noticed after [s]", "runs", "failed", "touched",
+             "to rest: median, longest [s]", "least to spare [s]", "drives again after: median, longest [s]"],
             rows,
         ),
         f"{again} runs in which the twin was late by more than {1e3 * LATE:.0f} ms were run again:"
