@@ -118,7 +118,8 @@ def faults(found: Iterable[Result]) -> str:
         FAULTS_HEAD.strip(),
         _table(
             ["fault", "noticed after [s]", "runs", "failed", "touched",
-             "to rest: median, longest [s]", "least to spare [s]", "drives again after: median, longest [s]"],
+             "to rest: median, longest [s]", "least to spare [s]",
+             "drives again after: median, longest [s]"],
             rows,
         ),
         f"{again} runs in which the twin was late by more than {1e3 * LATE:.0f} ms were run again:"
