@@ -93,10 +93,10 @@ def _read(section: Section, kind: type[T], **readers: Callable[[Any], Any]) -> T
     for field in dataclasses.fields(kind):  # type: ignore[arg-type]
         if not field.init:
             continue
-        least = field.default is dataclasses.MISSING and (
+        needed = field.default is dataclasses.MISSING and (
             field.default_factory is dataclasses.MISSING
         )
-        default = REQUIRED if least else None
+        default = REQUIRED if needed else None
         reader = readers.get(field.name)
         value = (
             section.number(field.name, default)

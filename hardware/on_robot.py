@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import subprocess
 import time
 from collections import Counter
 from collections.abc import Callable
@@ -12,7 +13,7 @@ from contextlib import ExitStack
 import numpy as np
 
 from hardware.button_device import READY
-from hardware.chain import PlannerLoop, Round, poser
+from hardware.chain import PlannerLoop, poser
 from hardware.child import ended, started
 from hardware.complaints import advice
 from hardware.config import DriveConfig
@@ -65,6 +66,7 @@ class RobotDrive:
             config.robot, config.planner_settings, goal=config.goals,
             static_map=_known(config), seed=seed,
         )  # fmt: skip
+        self._button: subprocess.Popen[bytes] | None = None
         self._open = ExitStack()
 
     def __enter__(self) -> RobotDrive:
@@ -90,8 +92,8 @@ class RobotDrive:
             open_.callback(self.executor.close)
             if config.button is not None:
                 told = {"directory": str(config.directory), "device": str(config.button)}
-                button, said = started("hardware.button_device", json.dumps(told), START)
-                open_.callback(ended, button, 1.0)
+                self._button, said = started("hardware.button_device", json.dumps(told), START)
+                open_.callback(ended, self._button, 1.0)
                 if said != READY:
                     raise RuntimeError(f"the stop button did not start: {said!r}")
             self.link = open_.enter_context(PlannerLink(config.directory, track=config.robot.track))
@@ -129,18 +131,22 @@ class RobotDrive:
             self.navigator, self.link, self.clients,
             cycle=self.config.planner.cycle, apart=self.config.apart,
         )  # fmt: skip
-        rounds: list[Round] = []
+        cycles = sent = 0
+        took: list[float] = []
         decisions: Counter[str] = Counter()
         began = told_at = time.monotonic()
         with interrupts() as heard:
             why = ""
             while not why:
                 try:
-                    rounds.append(loop.round())
+                    done = loop.round()
                 except Unfit as cause:  # another device answers at that address now
                     why = f"a range finder cannot do what its section asks: {cause}"
                     break
-                if rounds[-1].took is not None:
+                cycles += 1
+                sent += done.sent is not None
+                if done.took is not None:
+                    took.append(done.took)
                     decisions[self.navigator.record.decision] += 1
                 now = time.monotonic()
                 why = self._ends(loop, heard, now - began, seconds)
@@ -153,10 +159,9 @@ class RobotDrive:
             name=self.config.name, reached=self.navigator.reached,
             interrupted=heard.count > 0, why=why,
             seconds=time.monotonic() - began, cycle=self.config.planner.cycle,
-            rounds=len(rounds), idle=sum(one.took is None for one in rounds),
-            sent=sum(one.sent is not None for one in rounds),
+            rounds=cycles, idle=cycles - len(took), sent=sent,
             refused=0 if status is None else status.refused,
-            took=np.array([one.took for one in rounds if one.took is not None]),
+            took=np.array(took),
             decisions=dict(decisions),
             worst_error=math.nan if status is None else status.worst_error,
             lost={
@@ -224,6 +229,8 @@ class RobotDrive:
             return "the machine was asleep, and what was seen before holds no more"
         if not self.executor.alive:
             return "the executor is gone; the base brakes by itself"
+        if self._button is not None and self._button.poll() is not None:
+            return "the stop button is gone, and was pressed as it went"
         return ""
 
     def _to_rest(self, why: str, heard: Interrupts) -> str:

@@ -334,6 +334,25 @@ def test_a_second_ctrl_c_presses_the_emergency_stop(tmp_path):
 
 
 @pytest.mark.campaign
+def test_a_button_that_is_pulled_out_stops_the_robot_and_ends_the_drive(tmp_path):
+    device = tmp_path / "events"
+    os.mkfifo(device)
+    hand = [os.open(device, os.O_RDWR)]
+    config = replace(emulated(tmp_path), button=device)
+
+    def see(look):
+        while hand:
+            os.close(hand.pop())
+
+    with on_robot.RobotDrive(config) as robot:
+        driven = robot.run(60.0, see)
+        robot.link.poll(timeout=1.0)
+        assert robot.link.status.state is State.EMERGENCY
+    assert "the stop button is gone" in driven.why
+    assert not driven.reached
+
+
+@pytest.mark.campaign
 def test_the_example_gets_to_its_goal(tmp_path):
     config = replace(read_config(EXAMPLES / "emulated.yaml"), directory=tmp_path / "x")
     with on_robot.RobotDrive(config) as robot:
