@@ -110,7 +110,8 @@ class TwinRig:
             return [Tick(*row) for row in ROW.iter_unpack(file.read(count * ROW.size))]
 
     def twin(self, wrong: str) -> None:
-        """As `twin_process.WRONGS`."""
+        """One of `twin_process.WRONGS`."""
+        door.choice("TwinRig.twin", "wrong", wrong, twin_process.WRONGS)
         self._orders.post(self.chain.directory / twin_process.ORDERS, wrong.encode())
 
     def planner(self, wrong: str) -> None:
