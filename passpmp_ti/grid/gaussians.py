@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 
 FARTHEST = 4.5
 """Standard deviations that count where a covariance shrinks."""
+TINY = 1e-300
+"""Instead of nothing, to divide by."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,20 +36,19 @@ class Shape:
     def of(cls, covariance: np.ndarray, floor: np.ndarray | float) -> Shape:
         """Of [..., 4, 4] covariances, none of whose deviations is to be below `floor` [m]."""
         xx, yy, xy = covariance[..., 0, 0], covariance[..., 1, 1], covariance[..., 0, 1]
-        middle = 0.5 * (xx + yy)
-        greater = middle + np.hypot(0.5 * (xx - yy), xy)
+        half = 0.5 * (xx - yy)
+        gap = np.sqrt(half * half + xy * xy)
+        greater = 0.5 * (xx + yy) + gap
         # both make the determinant; their difference would lose the smaller one
         smaller = np.maximum(xx * yy - xy * xy, 0.0) / greater
         square = np.maximum(floor**2 - smaller, 0.0)
-        angle = 0.5 * np.arctan2(2 * xy, xx - yy)
+        # half of an angle from its cosine; a round one's axes are any
+        cosine = half / np.maximum(gap, TINY)
         return cls(
-            xx + square, yy + square, xy, np.cos(angle), np.sin(angle),
-            np.sqrt(greater + square), np.sqrt(smaller + square), np.sqrt(square),
+            xx + square, yy + square, xy, np.sqrt(0.5 + 0.5 * cosine),
+            np.copysign(np.sqrt(0.5 - 0.5 * cosine), xy), np.sqrt(greater + square),
+            np.sqrt(smaller + square), np.sqrt(square),
         )  # fmt: skip
-
-    def moments(self, some: slice) -> Shape:
-        """Those of some of the last axis."""
-        return Shape(*(getattr(self, f.name)[..., some] for f in fields(self)))
 
     def along(self, xx: np.ndarray, yy: np.ndarray, xy: np.ndarray) -> tuple[np.ndarray, ...]:
         """(xx, yy, xy) of symmetric matrices in the frames of the principal axes."""
@@ -58,10 +59,12 @@ class Shape:
             cs * (yy - xx) + (cc - ss) * xy,
         )
 
-    def whitened(self, xx: np.ndarray, yy: np.ndarray, xy: np.ndarray) -> tuple[np.ndarray, ...]:
-        """The same as seen from where these Gaussians are standard normal ones."""
-        xx, yy, xy = self.along(xx, yy, xy)
-        return xx / self.great**2, yy / self.least**2, xy / (self.great * self.least)
+
+def by_component(array: np.ndarray, axes: int) -> np.ndarray:
+    """The same array, but in memory each component, along its last `axes`, lies together."""
+    last = tuple(range(-axes, 0))
+    first = tuple(range(axes))
+    return np.moveaxis(np.ascontiguousarray(np.moveaxis(array, last, first)), first, last)
 
 
 def between(
@@ -83,17 +86,35 @@ def between(
     covariance = first + share[:, None, None] * (second - first)
     inner = np.flatnonzero(share > 0)
     if len(inner):
-        start, s = first[:, :, inner], share[inner]
-        move = np.tile(np.eye(4), (len(inner), 1, 1))
-        move[:, 0, 2] = move[:, 1, 3] = length
-        noise = second[:, :, inner] - move @ start @ np.swapaxes(move, -1, -2)
-        move[:, 0, 2] = move[:, 1, 3] = s * length
-        grown = s[:, None] * np.array([1.0, 1.0, 0.0, 0.0]) + np.array([0.0, 0.0, 1.0, 1.0])
-        pushed = s[:, None, None] * noise * grown[:, :, None] * grown[:, None, :]
-        fits = np.linalg.eigvalsh(noise)[..., 0] >= -1e-9
-        drifted = move @ start @ np.swapaxes(move, -1, -2) + pushed
-        covariance[:, :, inner] = np.where(fits[..., None, None], drifted, covariance[:, :, inner])
+        start, s = first[:, :, inner], share[inner, None, None]
+        noise = second[:, :, inner] - _drifted(start, length)
+        grown = np.array([1.0, 1.0, 0.0, 0.0]) * s[..., 0] + np.array([0.0, 0.0, 1.0, 1.0])
+        pushed = s * noise * grown[:, :, None] * grown[:, None, :]
+        fits = _positive(noise + 1e-9 * np.eye(4))
+        pushed += _drifted(start, s * length)
+        covariance[:, :, inner] = np.where(fits[..., None, None], pushed, covariance[:, :, inner])
     return mean, covariance
+
+
+def _drifted(covariance: np.ndarray, time: np.ndarray | float) -> np.ndarray:
+    """[..., 4, 4] covariances after a time at constant velocity [s]."""
+    after = covariance.copy()
+    after[..., :2, :] += time * covariance[..., 2:, :]
+    after[..., :, :2] += time * after[..., :, 2:]
+    return after
+
+
+def _positive(matrix: np.ndarray) -> np.ndarray:
+    """[...] bool: symmetric matrices [..., 4, 4] that are positive definite: all pivots are
+    positive. Several times as fast as eigenvalues."""
+    rest = np.moveaxis(matrix, (-2, -1), (0, 1)).copy()
+    positive = np.ones(rest.shape[2:], dtype=bool)
+    for k in range(4):
+        pivot = rest[k, k]
+        positive &= pivot > 0
+        column = rest[k + 1 :, k] / np.where(pivot > 0, pivot, 1.0)
+        rest[k + 1 :, k + 1 :] -= column[:, None] * rest[None, k, k + 1 :]
+    return positive
 
 
 def bends_of(
@@ -111,21 +132,29 @@ def bends_of(
         length: [J - 1] from each moment to the next [s].
     """
     strongest = np.zeros(1)
-    ends = slice(None, -1), slice(1, None)
-    rate = tuple(np.diff(getattr(shape, name), axis=-1) / length for name in ("xx", "yy", "xy"))
-    step = np.diff(mean[..., :2], axis=-2)
-    for end in ends:
-        at = shape.moments(end)
-        xx, yy, xy = at.whitened(*rate)
-        middle = 0.5 * (xx + yy)
-        gap = np.hypot(0.5 * (xx - yy), xy)
+    determinant = (shape.great * shape.least) ** 2
+    inverse = shape.yy / determinant, shape.xx / determinant, -shape.xy / determinant
+    xx, yy, xy = (np.diff(part, axis=-1) / length for part in (shape.xx, shape.yy, shape.xy))
+    product = xx * yy - xy * xy
+    x, y = (np.diff(mean[..., axis], axis=-1) / length for axis in range(2))
+    speed = x * x, y * y, x * y
+    for end in (slice(None, -1), slice(1, None)):
+        # the inverse makes of the rate what it is as seen from where the Gaussian is a standard one
+        at = tuple(part[..., end] for part in inverse)
+        middle = 0.5 * _trace(at, (xx, yy, xy))
+        square = np.maximum(middle * middle - product / determinant[..., end], 0.0)
+        gap = np.sqrt(square)
         up, down = np.maximum(middle + gap, 0.0), np.maximum(gap - middle, 0.0)
-        own = up**2 + 2 * up * np.maximum(middle, 0.0) - middle**2 - gap**2
-        own += 2 * down * (up + down) * FARTHEST**2
+        own = up * (up + 2 * np.maximum(middle, 0.0)) - middle * middle - square
+        own += 2 * FARTHEST**2 * down * (up + down)
         pvv = covariance[..., end, 2:, 2:]
-        xx, yy, _ = at.whitened(pvv[..., 0, 0], pvv[..., 1, 1], pvv[..., 0, 1])
-        along = (at.c * step[..., 0] + at.s * step[..., 1]) / at.great
-        across = (at.c * step[..., 1] - at.s * step[..., 0]) / at.least
-        moved = np.hypot(along, across) / length
-        strongest = np.maximum(strongest, moved + np.sqrt(np.maximum(own, 0.0) + xx + yy))
+        spread = _trace(at, (pvv[..., 0, 0], pvv[..., 1, 1], pvv[..., 0, 1]))
+        bend = np.sqrt(np.maximum(_trace(at, speed), 0.0))
+        bend += np.sqrt(np.maximum(np.maximum(own, 0.0) + spread, 0.0))
+        strongest = np.maximum(strongest, bend)
     return 0.5 * length * strongest
+
+
+def _trace(first: tuple[np.ndarray, ...], second: tuple[np.ndarray, ...]) -> np.ndarray:
+    """Of the products of symmetric matrices (xx, yy, xy)."""
+    return first[0] * second[0] + first[1] * second[1] + 2 * first[2] * second[2]

@@ -11,7 +11,7 @@ from typing import Protocol
 
 import numpy as np
 
-from passpmp_ti.grid.gaussians import Shape, bends_of, between
+from passpmp_ti.grid.gaussians import Shape, bends_of, between, by_component
 from passpmp_ti.grid.reach import Reach
 
 SHARPEST = 16.0
@@ -110,23 +110,25 @@ def moments_of(
     layers = len(forecast.times)
     length = (forecast.times[-1] - forecast.times[0]) / (layers - 1)
     size = radius[:, None, None]
+    means, covariances = by_component(forecast.mean, 1), by_component(forecast.covariance, 2)
     # what the nodes of a layer that wide will blur anyway needs no moments of its own
     coarse = 2 * reach.way(forecast.times) / (MOST_SIDE - 2) / COARSEST
-    shape = Shape.of(forecast.covariance, np.maximum(size / SHARPEST, coarse))
-    wanted = _within_reach(forecast.mean, forecast.covariance, shape, size, reach, forecast.times)
+    shape = Shape.of(covariances, np.maximum(size / SHARPEST, coarse))
+    wanted = _within_reach(means, covariances, shape, size, reach, forecast.times)
     wanted &= (forecast.weight >= SMALLEST)[..., None]
-    bends = bends_of(shape, forecast.mean, forecast.covariance, length)
+    bends = bends_of(shape, means, covariances, length)
     met = wanted[..., 1:] | wanted[..., :-1]
     steepest = np.where(met, bends, 0.0).max(axis=(0, 1), initial=0.0)
     # how many moments begin with each layer: none where it can be done without
     counts = np.append(np.clip(np.ceil(steepest / BEND), 1, MOST_PARTS).astype(np.int64), 1)
-    counts[_needless(forecast.mean, shape, steepest)] = 0
+    counts[_needless(means, shape, steepest)] = 0
     ends = np.cumsum(counts)
     layer = np.repeat(np.arange(layers), counts)
     share = (np.arange(len(layer)) - (ends - counts)[layer]) / counts[layer]
     starts = np.where(counts > 0, ends - counts, ends - 1)
     times = forecast.times[layer] + share * length
     mean, covariance = between(forecast.mean, forecast.covariance, layer, share, length)
+    mean, covariance = by_component(mean, 1), by_component(covariance, 2)
     duration = np.diff(times)
 
     plain = Shape.of(covariance, 0.0)

@@ -256,10 +256,12 @@ def values_at(window: window22, place: place3, pool: ti.template(), x, y):
         fy -= j
         at = (place[0] + i * place[2] + j) * CHANNELS
         right = at + place[2] * CHANNELS
+        both = fx * fy
+        far_x, far_y = fx - both, fy - both
+        near = 1.0 - fx - far_y
         for r in ti.static(range(CHANNELS)):
-            low = pool[at + r] + fy * (pool[at + CHANNELS + r] - pool[at + r])
-            high = pool[right + r] + fy * (pool[right + CHANNELS + r] - pool[right + r])
-            value[r] = low + fx * (high - low)
+            low = near * pool[at + r] + far_y * pool[at + CHANNELS + r]
+            value[r] = low + far_x * pool[right + r] + both * pool[right + CHANNELS + r]
         if x < 0.0:
             value[3] = -value[3]
             value[4] = -value[4]

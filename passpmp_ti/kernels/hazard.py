@@ -125,8 +125,10 @@ def columns_within(left, density, first, last, x, off, square):
 
 
 @ti.func
-def layer_at(layers: ti.template(), grids: ti.template(), begins: ti.template(), j, p: vec2):
-    """[8] of one layer, bilinear; nothing is beyond it, LOST where the robot cannot be."""
+def layer_at(
+    layers: ti.template(), grids: ti.template(), begins: ti.template(), j, share, p: vec2
+):
+    """[8] a share of one layer, bilinear; nothing is beyond it, LOST where the robot cannot be."""
     fx = (p[0] - grids[j, 0]) * grids[j, 2]
     fy = (p[1] - grids[j, 1]) * grids[j, 2]
     column = ti.cast(ti.floor(fx), ti.i32)
@@ -135,15 +137,18 @@ def layer_at(layers: ti.template(), grids: ti.template(), begins: ti.template(),
     if column >= 0 and row >= 0 and column < begins[j, 1] - 1 and row < begins[j, 2] - 1:
         fx -= column
         fy -= row
+        above = share * fy
+        below = share - above
+        right, up_right = below * fx, above * fx
+        left, up_left = below - right, above - up_right
         at = (begins[j, 0] + row * begins[j, 1] + column) * KINDS
         up = at + begins[j, 1] * KINDS
         for r in ti.static(range(KINDS)):
-            low = layers[at + r] + fx * (layers[at + KINDS + r] - layers[at + r])
-            high = layers[up + r] + fx * (layers[up + KINDS + r] - layers[up + r])
-            value[r] = low + fy * (high - low)
+            low = left * layers[at + r] + right * layers[at + KINDS + r]
+            value[r] = low + up_left * layers[up + r] + up_right * layers[up + KINDS + r]
     off = p - vec2(grids[j, 6], grids[j, 7])
     if off.dot(off) > grids[j, 8]:
-        value = kinds8(LOST)
+        value = kinds8(share * LOST)
     return value
 
 
@@ -159,8 +164,8 @@ def hazard_at(
 ):
     """[8] at a time [ticks], linear between moments; beyond the forecast nothing is known."""
     j, share = moment_of(starts, odds, tick)
-    before = layer_at(layers, grids, begins, j, p)
-    value = before + share * (layer_at(layers, grids, begins, j + 1, p) - before)
+    value = layer_at(layers, grids, begins, j, 1.0 - share, p)
+    value += layer_at(layers, grids, begins, j + 1, share, p)
     if (tick - odds[0]) * odds[1] > starts.shape[0] - 1 + 1e-3:
         value = kinds8(LOST)
     return value

@@ -301,30 +301,31 @@ def risk_along(
     left = steps
     if steps < 0:
         left = braking_steps(kind, q, control, dt)
-    moving = True
+    resting = at_rest(kind, q)
+    moving = not resting
     going = left > 0
-    if at_rest(kind, q):
-        moving = False
-        if steps < 0:
-            going = False
+    if resting and steps < 0:
+        going = False
     while going:
         # on to the next sample
         taken = 0
         while going and taken < tally[4]:
             ahead = step(kind, robot, q, control, direction, dt)
-            if at_rest(kind, q) and not at_rest(kind, ahead):
+            rests = at_rest(kind, ahead)
+            if resting and not rests:
                 moving = True
                 risk[TOUCH] += 0.5 * touched_now(
                     numbers, counts, layers, grids, begins, starts, odds, q, tick
                 )
             q = ahead
+            resting = rests
             tick += counts[4]
             taken += 1
             left -= 1
             going = left > 0
             if steps < 0:
-                going = not at_rest(kind, q)
-            if moving and at_rest(kind, q):
+                going = not resting
+            if moving and resting:
                 # a rest ends what is counted
                 break
         if moving:
@@ -338,13 +339,13 @@ def risk_along(
                 sample_tick, before, after,
             )  # fmt: skip
             before = after
-            if at_rest(kind, q) or not going:
+            if resting or not going:
                 risk[TOUCH] += crossed_about(
                     kind, numbers, counts, robot, layers, grids, begins, starts, odds, q, tick,
                     before, 0.0,
                 )  # fmt: skip
                 before = 0.0
-            if at_rest(kind, q):
+            if resting:
                 moving = False
                 risk[TOUCH] += 0.5 * touched_now(
                     numbers, counts, layers, grids, begins, starts, odds, q, tick

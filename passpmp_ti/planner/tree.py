@@ -286,7 +286,7 @@ class TreeGrower:
             weights = model.hidden_ticks, model.hidden_spans, *model.chances.hazard
             begin_risk(
                 body.kind, body.numbers, model.counts, *model.chances.hazard,
-                device.put(root_pose[None]), model.ticks_of(start), self._risk,
+                device.put(root_pose[None]), int(model.ticks_of(start)), self._risk,
             )  # fmt: skip
         roads = self._roads
         roads.clear()

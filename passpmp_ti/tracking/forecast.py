@@ -196,6 +196,7 @@ def forecast(
         mean=mean,
         covariance=covariance,
         radius=radius,
+        trusted=True,
     )
 
 
