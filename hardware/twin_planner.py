@@ -37,6 +37,7 @@ from hardware.twin_wrong import ORDERS, WrongLink
 from passpmp_ti import door
 from passpmp_ti.grid.static_map import StaticMap
 from passpmp_ti.planner.navigator import Navigator
+from passpmp_ti.sim.scenario import Scenario
 from passpmp_ti.sim.world import World
 
 READY = b"ready\n"
@@ -124,10 +125,10 @@ def tell_ports(directory: Path, ports: list[int]) -> None:
     beside.rename(directory / PORTS)
 
 
-def known_map(world: World) -> StaticMap | None:
+def known_map(scenario: Scenario, world: World) -> StaticMap | None:
     """Scans from the wire do not tell what stays: the map does, as on a chair that has one."""
-    if not len(world.outline):
-        return None
+    if scenario.static_map is not None or not len(world.outline):
+        return scenario.static_map
     return StaticMap.from_segments(world.outline, thickness=2 * WALL_HALF)
 
 
@@ -187,10 +188,9 @@ def _navigator(config: PlannerConfig) -> Navigator:
         backend.init(threads=config.threads)
     scenario, seed = config.twin.load(), config.twin.seed
     world, _, _ = scenario.build(seed)
-    known = known_map(world) if scenario.static_map is None else scenario.static_map
     return Navigator(
         scenario.robot, settings_of(scenario, world, config.cycle, config.twin.nature()),
-        goal=config.goals, static_map=known, seed=seed,
+        goal=config.goals, static_map=known_map(scenario, world), seed=seed,
     )  # fmt: skip
 
 
