@@ -10,7 +10,7 @@ import json
 import math
 import sys
 import time
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from hardware.bags_drive import DriveWriter
     from hardware.ros_messages import Pose
     from hardware.twin import Chain, Look
-    from hardware.twin_cycles import Cycle
     from hardware.twin_view import View
     from passpmp_ti.grid.static_map import StaticMap
 
@@ -161,18 +160,15 @@ def _on_twin(given: argparse.Namespace) -> int:
     door.finite("drive", "seconds", seconds, above=0.0, unit="s")
     try:
         with contextlib.ExitStack() as open_:
+            record = None
             if given.bag is not None:
-                from hardware.twin_planner import known_map
-
                 mounts = [lidar.mount for lidar in chain.scenario.lidars]
-                known = known_map(chain.scenario, chain.world)
-                bag = _recorder(given.bag, mounts, chain.robot.track, known)
-                # when the drive is over, however it ended: writing takes time from nobody
-                open_.callback(_record, chain.cycles, open_.enter_context(bag))
+                bag = _recorder(given.bag, mounts, chain.robot.track, chain.known)
+                record = open_.enter_context(bag).see
             open_.enter_context(chain)
             if given.live is not None:
                 open_.callback(_shown(chain, given.live).close)
-            found = chain.run(seconds, lambda look: print(line(look), file=sys.stderr))
+            found = chain.run(seconds, lambda look: print(line(look), file=sys.stderr), record)
     except RuntimeError as trouble:
         print(f"passpmp: {trouble}", file=sys.stderr)
         return FAILED
@@ -193,12 +189,6 @@ def _recorder(
 
     ahead = time.time() - time.monotonic()
     return DriveWriter(path, mounts, track=track, ahead=ahead, known=known)
-
-
-def _record(cycles: Iterable[Cycle], bag: DriveWriter) -> None:
-    for cycle in cycles:
-        if cycle.state is not None:
-            bag.see(cycle.scans, cycle.state)
 
 
 def _shown(chain: Chain, folder: str) -> View:

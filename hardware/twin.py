@@ -13,7 +13,7 @@ import tempfile
 import time
 from collections.abc import Callable
 from contextlib import ExitStack
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -27,10 +27,12 @@ from hardware.twin_cycles import Cycle, CycleReader
 from hardware.twin_figures import Chained, chained, last_tick
 from hardware.twin_film import film
 from hardware.twin_picture import Picture
-from hardware.twin_planner import CYCLES, PlannerConfig, PlannerProcess, tell_ports
+from hardware.twin_planner import CYCLES, PlannerConfig, PlannerProcess, known_map, tell_ports
 from hardware.twin_process import BASE, TwinConfig, TwinProcess
 from hardware.twin_settings import executor_of, settings_of
+from passpmp_ti.grid.static_map import StaticMap
 from passpmp_ti.robots import DifferentialDrive
+from passpmp_ti.scan import Scan
 from passpmp_ti.sim.contacts import Contact
 from passpmp_ti.sim.drive import Drive
 from passpmp_ti.sim.episode import episode_of
@@ -91,7 +93,7 @@ class Chain:
             goals: to be reached one after the other [m]; None: the scenario's.
             ahead: the scenario has gone on for so long when the chair begins [s].
             obeys: whether twin and planner can be told to go wrong.
-            keeps_scans: whether `cycles` have the scans that were planned on.
+            keeps_scans: whether a drive can be recorded, see `run`.
 
         Raises:
             ValueError: no such scenario, or one that no chair can drive.
@@ -123,6 +125,7 @@ class Chain:
         """The truth, as `TwinProcess.truth` tells it, piece by piece."""
         self.revived = 0
         """Planners that were started because one had died."""
+        self._record: Callable[[tuple[Scan, ...], np.ndarray], None] | None = None
         self._goals_before = 0  # reached by planners that are gone
         self._goals_now = 0  # by the one that there is
         self._heard = CycleReader(directory / CYCLES)
@@ -166,6 +169,11 @@ class Chain:
         self._open.close()
 
     @property
+    def known(self) -> StaticMap | None:
+        """What the planner is told of what stays."""
+        return known_map(self.scenario, self.world)
+
+    @property
     def goals_reached(self) -> int:
         """How many of them, so far."""
         return self._goals_before + self._goals_now
@@ -196,17 +204,25 @@ class Chain:
         self.planner = self.start_planner()
         self.revived += 1
 
-    def run(self, seconds: float, see: Callable[[Look], None] | None = None) -> Chained:
+    def run(
+        self,
+        seconds: float,
+        see: Callable[[Look], None] | None = None,
+        record: Callable[[tuple[Scan, ...], np.ndarray], None] | None = None,
+    ) -> Chained:
         """Drive until the goal is reached, or the time is over, or Ctrl-C.
 
         Args:
             seconds: longest [s].
             see: is shown how it goes, about once a second.
+            record: is shown the scans and the state that each cycle planned on, where the chain
+                keeps scans.
 
         Raises:
             RuntimeError: twin or executor are gone, or a planner that died could not be started
                 again.
         """
+        self._record = record
         began = time.monotonic()
         told_at, reached_at = began, None
         interrupted = False
@@ -246,7 +262,10 @@ class Chain:
     def see(self) -> None:
         """Take note of what was done, and of what really happened, since."""
         for cycle in self._heard.new():
-            self.cycles.append(cycle)
+            if self._record is not None and cycle.state is not None:
+                self._record(cycle.scans, cycle.state)
+            # a long drive's scans are too many to be kept here
+            self.cycles.append(replace(cycle, scans=()))
             self._goals_now = cycle.goals_reached
             if cycle.record is not None and cycle.took is not None:
                 self.drive.note(cycle.record, cycle.took)

@@ -110,7 +110,8 @@ class TwinRig:
             return [Tick(*row) for row in ROW.iter_unpack(file.read(count * ROW.size))]
 
     def twin(self, wrong: str) -> None:
-        """As `twin_process.WRONGS`."""
+        """One of `twin_process.WRONGS`."""
+        door.choice("TwinRig.twin", "wrong", wrong, twin_process.WRONGS)
         self._orders.post(self.chain.directory / twin_process.ORDERS, wrong.encode())
 
     def planner(self, wrong: str) -> None:
@@ -179,7 +180,8 @@ def kinds(settings: ExecutorSettings, period: float) -> list[Kind]:
         ),
         Kind("lidars' cable pulled", twin("cable"), twin(""), told + SWEEP, False),
         Kind("lidars frozen on a scan", twin("frozen"), twin(""), told + SWEEP, False),
-        Kind("lidars rebooted", twin("reboot"), twin(""), told + SWEEP, False, stays=False),
+        # it ends by itself, `twin_process.BOOT` later
+        Kind("lidars rebooted", twin("reboot"), twin(""), told + SWEEP, False),
         Kind("base's feedback lost", twin("silent"), twin(""),
              settings.feedback_timeout + hop, True),
         Kind("planner's clock stepped", TwinRig.step_clock, planner(""), told, False),
@@ -227,14 +229,19 @@ def carry_out(rig: TwinRig, kind: Kind, number: int, rng: np.random.Generator) -
 
 
 def drive(left: list[Job], seed: int) -> Generator[Result, None, None]:
-    """Each of these faults, in one drive after the other."""
+    """Each of these faults, in one drive after the other; after one that failed all is started
+    anew, so that it fails alone."""
     rng = np.random.default_rng([seed, len(left)])
-    size = ROUNDS * 10
-    for first in range(0, len(left), size):
-        with TwinRig(seed=left[first].number) as rig:
+    waiting = list(left)
+    while waiting:
+        with TwinRig(seed=waiting[0].number) as rig:
             known = {k.name: k for k in kinds(rig.settings, rig.chain.config.nature().period)}
-            for job in left[first : first + size]:
-                yield carry_out(rig, known[job.kind], job.number, rng)
+            for job in waiting[: ROUNDS * len(known)]:
+                found = carry_out(rig, known[job.kind], job.number, rng)
+                waiting.pop(0)
+                yield found
+                if found["failure"]:
+                    break
 
 
 def line(found: dict[str, Any]) -> str:

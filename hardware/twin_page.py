@@ -7,16 +7,21 @@
 from __future__ import annotations
 
 import argparse
+import math
 import sys
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 
+from hardware.chair_model import ChairNature
 from hardware.twin_experiments import EXPERIMENTS, LATE, TRIES
+from hardware.twin_faults import CYCLE, kinds
+from hardware.twin_settings import executor_of
 from passpmp_ti.compare.job import Result
 from passpmp_ti.compare.ledger import EPISODES, Ledger
 
+PERIOD = ChairNature().period
 HEAD = """# What was driven on the twin
 
 Made by `python -m hardware.twin_page`; do not edit. How the twin is made, and what the numbers
@@ -45,7 +50,8 @@ corridor. At a random moment while it moves faster than 0.25 m/s one thing break
 the end of what was held when the fault could be known, and `rest_late`; or, where it brakes off
 its path, the detection time, the braking time from the speed it had, and `rest_late`. *Failed*:
 late at rest, or moved while the fault lasted, or did not drive again once it was mended.
-*Touched*: contacts while it moved.
+*Touched*: contacts while it moved. *Noticed after*: from then on nothing new is taken, or it
+brakes.
 """
 DISTURBED = (
     f"A drive in which the twin itself was late by more than {1e3 * LATE:.0f} ms at any moment is"
@@ -68,14 +74,14 @@ def experiments(found: Iterable[Result]) -> str:
     rest = sum(not f["quiet"] for f in known)
     touched = sum(d["collisions_moving"] for f in known for d in f["disturbed"])
     return "\n\n".join([
-        EXPERIMENTS_HEAD,
+        EXPERIMENTS_HEAD.strip(),
         _table(
             ["experiment, cycle", "objects [m/s]", "drives", "goal reached", "time to it [s]",
              "contacts moving, at rest", "nearest wall, mover [m]", "stood [s]",
              "off its path [mm]", "stops off what is held"],
             drives,
         ),
-        LATENCIES_HEAD,
+        LATENCIES_HEAD.strip(),
         _table(
             ["experiment, cycle", "stamp to arrival [ms]", "to new trajectory [ms]",
              "to executor [ms]", "to wheels [ms]", "sent; not taken", "cycles without a scan",
@@ -90,30 +96,35 @@ def experiments(found: Iterable[Result]) -> str:
 def faults(found: Iterable[Result]) -> str:
     """The table of the faults, as markdown."""
     known = list(found)
+    noticed = {kind.name: kind.detection for kind in kinds(executor_of(CYCLE), PERIOD)}
     rows = []
     for name in dict.fromkeys(f["kind"] for f in known):
         these = [f for f in known if f["kind"] == name]
-        took, back = [f["took"] for f in these], [f["back"] for f in these]
+        # one that never rested has no time of rest
+        rested = [f for f in these if math.isfinite(f["took"])]
+        took, back = [f["took"] for f in rested], [f["back"] for f in rested]
         rows.append([
-            name, str(len(these)), str(sum(bool(f["failure"]) for f in these)),
+            name, f"{noticed[name]:.2f}", str(len(these)),
+            str(sum(bool(f["failure"]) for f in these)),
             str(sum(f["touched"] for f in these)),
-            f"{np.median(took):.2f}, {max(took):.2f}",
-            f"{min(f['allowed'] - f['took'] for f in these):.2f}",
-            f"{np.median(back):.2f}, {max(back):.2f}",
+            f"{np.median(took):.2f}, {max(took):.2f}" if rested else "-",
+            f"{min(f['allowed'] - f['took'] for f in rested):.2f}" if rested else "-",
+            f"{np.median(back):.2f}, {max(back):.2f}" if rested else "-",
         ])  # fmt: skip
     again = sum(len(f["disturbed"]) for f in known)
     failed = sum(bool(d["failure"]) for f in known for d in f["disturbed"])
     touched = sum(d["touched"] for f in known for d in f["disturbed"])
     return "\n\n".join([
-        FAULTS_HEAD,
+        FAULTS_HEAD.strip(),
         _table(
-            ["fault", "runs", "failed", "touched", "to rest: median, longest [s]",
-             "least to spare [s]", "drives again after: median, longest [s]"],
+            ["fault", "noticed after [s]", "runs", "failed", "touched",
+             "to rest: median, longest [s]", "least to spare [s]",
+             "drives again after: median, longest [s]"],
             rows,
         ),
         f"{again} runs in which the twin was late by more than {1e3 * LATE:.0f} ms were run again:"
         f" {failed} of those failed, with {touched} contacts while moving.",
-        *(f"- {f['kind']} {f['seed']}: {f['failure']}" for f in known if f["failure"]),
+        "\n".join(f"- {f['kind']} {f['seed']}: {f['failure']}" for f in known if f["failure"]),
     ])  # fmt: skip
 
 

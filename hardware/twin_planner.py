@@ -127,10 +127,8 @@ def tell_ports(directory: Path, ports: list[int]) -> None:
 
 def known_map(scenario: Scenario, world: World) -> StaticMap | None:
     """Scans from the wire do not tell what stays: the map does, as on a chair that has one."""
-    if scenario.static_map is not None:
+    if scenario.static_map is not None or not len(world.outline):
         return scenario.static_map
-    if not len(world.outline):
-        return None
     return StaticMap.from_segments(world.outline, thickness=2 * WALL_HALF)
 
 

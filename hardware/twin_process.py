@@ -53,6 +53,8 @@ ROW = struct.Struct(f"<{len(Odometry._fields) + 2}d")
 """A row of the truth: the chair's, how far it leans [rad], and how late the twin is [s]."""
 BASE, TRUTH, ORDERS = "base", "truth", "twin-orders"
 """Names of the base's socket, the truth's file and the socket for orders in the directory."""
+BOOT = 5.0
+"""A lidar that restarts is silent for so long [s]: longer than any plan that is held."""
 MANY = 1 << 30
 """Sweeps that go wrong until it is mended."""
 WRONGS = ("cable", "frozen", "reboot", "silent", "")
@@ -259,7 +261,9 @@ def _emulated(
     """A range finder on its port, with a clock and a mirror of its own."""
     rate = 1.0 + float(rng.uniform(-5e-5, 5e-5))
     start, uneven = int(rng.integers(1 << 24)), float(rng.uniform(-2e-3, 2e-3))
-    nature = Nature(clock_start=start, clock_rate=rate, unevenness=uneven)
+    nature = Nature(
+        clock_start=start, clock_rate=rate, unevenness=uneven, boot_time=BOOT
+    )
     source = ChairLidar(chair, mount, rng)
 
     def make(now: float, source: Callable[[float], np.ndarray] = source) -> Device:

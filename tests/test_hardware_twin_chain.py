@@ -32,6 +32,7 @@ from hardware.twin_planner import CYCLES, PlannerConfig
 from hardware.twin_process import TwinConfig, _obey
 from hardware.twin_settings import TOP_SPEED, executor_of, on_chair, settings_of
 from hardware.twin_wrong import WrongLink
+from passpmp_ti.scan import Scan
 from passpmp_ti.sim.drive import Drive
 from passpmp_ti.sim.episode import episode_of
 from passpmp_ti.sim.scenario import load_scenario
@@ -229,8 +230,13 @@ def test_a_planner_that_died_is_followed_by_one_with_the_goals_that_are_left(
     chain.revive()
     assert started == [chain.goals, chain.goals[1:]]
     assert chain.goals_reached == 1
-    writer.add(cycle(2.0, reached=2))
+    recorded = []
+    chain._record = lambda scans, state: recorded.append((len(scans), state[0]))
+    scan = Scan(np.ones(9), 0.0, 0.1, 5.0, (0.0, 0.0, 0.0), 1.0)
+    planned = replace(cycle(2.0, reached=2), scans=(scan, scan), state=np.full(5, 7.0))
+    writer.add(planned)
     chain.see()
+    assert recorded == [(2, 7.0)]
     assert chain.goals_reached == 3
     writer.close()
     assert chain.revived == 1
@@ -341,7 +347,7 @@ def run_of(**changes):
 def test_faults_that_failed_are_on_the_page_those_of_disturbed_runs_too():
     again = [{"late": 1.0, "failure": "late", "touched": 2}]
     told = twin_page.faults([run_of(), run_of(seed=1, failure="it moved", disturbed=again)])
-    assert "| planner killed | 2 | 1 | 0 | 1.00, 1.00 | 0.50 | 3.00, 3.00 |" in told
+    assert "| planner killed | 0.03 | 2 | 1 | 0 | 1.00, 1.00 | 0.50 | 3.00, 3.00 |" in told
     assert "- planner killed 1: it moved" in told
     assert "1 runs in which the twin was late" in told
     assert "1 of those failed, with 2 contacts" in told

@@ -5,7 +5,9 @@ import math
 import numpy as np
 import pytest
 
-from hardware.steady import OWN, steadied
+from hardware.scip_client import ScipClient
+from hardware.scip_settings import ScipSettings
+from hardware.steady import OWN, SteadyClient, steadied
 from passpmp_ti.scan import Scan
 
 STEP = math.radians(0.25)
@@ -137,6 +139,41 @@ def test_a_range_gets_shorter_by_what_the_sensor_moved_and_none_longer():
     scan = Scan(np.full(BEAMS, 5.0), FIRST, STEP, 10.0, (0.0, 0.0, 0.0), 0.0)
     told = steadied(scan, 0.01, 0.0)
     assert told.ranges[20:-20] == pytest.approx(4.99)
+
+
+def read_by(state, monkeypatch):
+    """What a client tells of a wall 5 m away, whose robot is in such a state."""
+    scan = Scan(np.full(BEAMS, 5.0), FIRST, STEP, 10.0, (0.0, 0.0, 0.0), 7.0)
+    monkeypatch.setattr(ScipClient, "read", lambda self, timeout: scan)
+    asked = []
+
+    def state_at(when):
+        asked.append(when)
+        return state
+
+    client = SteadyClient(
+        ScipSettings(host="127.0.0.1"), state_at=state_at, pose_at=lambda when: (0.0, 0.0, 0.0),
+        track=0.54, arm=0.3, heading_error=0.006,
+    )  # fmt: skip
+    told = client.read(0.0)
+    # of the moment that no beam is more than half of the stamp's error away from
+    assert asked == [7.0 - 0.5 * client.settings.stamp_error]
+    return told
+
+
+def test_the_faster_a_robot_goes_the_less_its_scans_prove(monkeypatch):
+    stands, rolls, turns = (
+        read_by(np.array([0.0, 0.0, 0.0, right, left]), monkeypatch)
+        for right, left in ((0.0, 0.0), (1.0, 1.0), (0.3, -0.3))
+    )
+    # 15 ms at 1 m/s, a quarter and 5 cm/s more
+    assert rolls.ranges[500] <= 5.0 - 0.015 * 1.3
+    assert 4.99 < stands.ranges[500] < 5.0
+    assert turns.lost.sum() > stands.lost.sum()
+
+
+def test_a_robot_of_whose_motion_nothing_is_known_has_seen_nothing(monkeypatch):
+    assert read_by(None, monkeypatch).lost.all()
 
 
 @pytest.mark.parametrize("bad", [-0.1, math.nan])
