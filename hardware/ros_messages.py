@@ -309,8 +309,11 @@ def static_map_of(message: Any) -> tuple[str, StaticMap]:
     if not len(data) or len(data) != info.width * info.height:
         raise Untrusted(f"a map of {info.width} times {info.height} cells with {len(data)} values")
     occupied = data.reshape(info.height, info.width) == OCCUPIED
+    # the shortest number that is this float32: 0.05 and not 0.0500000007, or a ring of cells that
+    # lie just as far from a wall as is tolerated would be lost; 1000 cells shift by 1 um
+    resolution = float(str(np.float32(info.resolution)))
     try:
-        return message.header.frame_id, StaticMap(occupied, float(info.resolution), (x, y, yaw))
+        return message.header.frame_id, StaticMap(occupied, resolution, (x, y, yaw))
     except ValueError as why:
         raise Untrusted(f"a map that is none: {why}") from why
 
