@@ -66,6 +66,7 @@ def test_the_same_drive_leaves_the_same_recording_in_both_formats(tmp_path):
     assert len(told[0]) == 1 + 3 * 10
 
 
+@pytest.mark.campaign
 def test_debians_rosbag_reads_what_is_written(tmp_path):
     tool = shutil.which("rosbag", path="/usr/bin")
     if tool is None:

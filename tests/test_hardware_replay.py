@@ -73,6 +73,7 @@ def test_a_drive_into_a_wall_was_not(tmp_path):
     assert "brake" in told["decisions"]
 
 
+@pytest.mark.campaign
 def test_the_same_recording_is_judged_the_same_in_either_format(tmp_path):
     found = [
         replayed(drive_in_room(tmp_path / f"same{suffix}", 0.4, seconds=0.5))
@@ -133,6 +134,7 @@ def test_bad_options_are_refused_by_name(tmp_path, capsys, options, said):
     assert said in capsys.readouterr().err
 
 
+@pytest.mark.campaign
 def test_a_recorded_rover_is_replayed(tmp_path):
     # a URG-04LX and wheel encoders; its README tells the columns
     source = Path(os.environ.get(DATA, REPOSITORY.parent / "shared" / "data"))
