@@ -44,6 +44,9 @@ LOOK = 0.002
 """It moves on this often [s]."""
 SCANNING = 0.025
 """From one sweep to the next [s]."""
+AT_ONCE = 0.001
+"""A sweep without physics is told to last so long [s]: one that tells nothing may last as long as
+any, and would not be over when it comes."""
 TELL = 1.0
 """From one look of the judge to the next [s]."""
 PRIORITY = 5
@@ -311,7 +314,7 @@ def plain_chair(
     chair = SimulatedBase(nature, rng=rng, pose=(x, y, theta), log=log)
 
     class Still:
-        lasts = 0.0
+        lasts = AT_ONCE
 
         def __init__(self, lidar: Lidar, rng: np.random.Generator) -> None:
             self._lidar, self._rng = lidar, rng

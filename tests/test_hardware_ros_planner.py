@@ -4,22 +4,27 @@ import math
 import time
 from contextlib import nullcontext
 from dataclasses import replace
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
+import yaml
 
 from hardware import ros_messages as ros
 from hardware import ros_planner
 from hardware.base import Odometry
+from hardware.ros_clock import JUMP
 from hardware.ros_planner import MOST_REASONS, Planner
 from hardware.ros_settings import RosSettings
+from hardware.ros_twin import RosTwin, RosTwinSettings
 from hardware.status import Reason, State
 from passpmp_ti.planner.navigator import Navigator
 from passpmp_ti.robots import DifferentialDrive
 from passpmp_ti.scan import Scan
 from passpmp_ti.settings import Settings
 
+HOME = Path(__file__).parents[1]
 ROOM = Scan(np.full(180, 5.0), -math.pi, math.tau / 180, 8.0, pose=(0, 0, 0), stamp=0.0)
 SMALL = {"particles": 20, "iterations": 10, "capacity": 300, "deadline": None}
 SETTINGS = RosSettings(
@@ -188,6 +193,19 @@ def test_after_the_machine_slept_nothing_is_planned_and_the_node_ends(monkeypatc
     monkeypatch.setattr(ros_planner, "PlannerLink", lambda *_, **__: nullcontext(link))
     with pytest.raises(RuntimeError, match="asleep"):
         planner.run(lambda: False)
+
+
+def test_scans_of_the_chair_without_physics_are_believed_as_they_come():
+    port = Port()
+    given = yaml.safe_load((HOME / "launch" / "twin.yaml").read_text())
+    settings = RosSettings.from_parameters(given)
+    twin = RosTwin(port, RosTwinSettings(chair="plain"))
+    twin._tell_scan(0, twin._eyes[0], time.monotonic())
+    sweep = ros.sweep_of(message(port.said["scan"][-1]), range_max=10.0)
+    over, _ = settings.moments(sweep.stamp, sweep.lasts)
+    assert 0.0 < over - sweep.stamp < JUMP
+    # one that tells nothing is taken to last for longer than it takes to come
+    assert settings.moments(sweep.stamp, 0.0)[0] - sweep.stamp > JUMP
 
 
 def test_names_from_outside_do_not_fill_the_memory(node):
