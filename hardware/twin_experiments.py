@@ -10,6 +10,7 @@ counted.
 from __future__ import annotations
 
 import argparse
+import os
 import sys
 import time
 from collections.abc import Generator, Iterable
@@ -82,6 +83,13 @@ class Job:
         return (self.experiment.scenario, self.experiment.variant, self.seed)
 
 
+def circumstances() -> dict[str, Any]:
+    """What a drive was driven on, when, and beside what load."""
+    return {
+        "machine": processor(), "commit": commit(), "at": time.time(), "load": os.getloadavg()[0]
+    }  # fmt: skip
+
+
 def carry_out(job: Job, film: Path | None = None) -> Result:
     """Drive once, and again where the twin was disturbed.
 
@@ -113,7 +121,7 @@ def carry_out(job: Job, film: Path | None = None) -> Result:
     return told | {
         "scenario": scenario, "variant": variant, "seed": seed, "error": None, "figure": e.figure,
         "disturbed": disturbed, "quiet": len(disturbed) < TRIES,
-        "timings": {"machine": processor(), "commit": commit(), "at": time.time()},
+        "timings": circumstances(),
     }  # fmt: skip
 
 
