@@ -10,6 +10,7 @@ counted.
 from __future__ import annotations
 
 import argparse
+import math
 import os
 import sys
 import time
@@ -96,6 +97,9 @@ def carry_out(job: Job, film: Path | None = None) -> Result:
     Args:
         job: what.
         film: where the last drive's video is to be, without its suffix; None: none is drawn.
+
+    Raises:
+        RuntimeError: a process did not start, or died, in each of the tries.
     """
     e = job.experiment
     disturbed: list[dict[str, Any]] = []
@@ -104,8 +108,17 @@ def carry_out(job: Job, film: Path | None = None) -> Result:
             e.scenario, seed=job.seed, cycle=e.cycle, object_speed=e.object_speed, threads=1,
             ahead=e.ahead,
         )  # fmt: skip
-        with chain:
-            told = chain.run(e.seconds).summary()
+        try:
+            with chain:
+                told = chain.run(e.seconds).summary()
+        except RuntimeError:
+            # a machine on which it does not even start, or go on, is disturbed
+            disturbed.append(
+                {"twin_latest": math.inf, "collisions_moving": 0, "reached_goal": False}
+            )
+            if len(disturbed) == TRIES:
+                raise
+            continue
         if told["interrupted"]:
             raise KeyboardInterrupt
         if told["twin_latest"] <= LATE:
