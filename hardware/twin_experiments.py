@@ -10,6 +10,8 @@ counted.
 from __future__ import annotations
 
 import argparse
+import math
+import os
 import sys
 import time
 from collections.abc import Generator, Iterable
@@ -82,12 +84,22 @@ class Job:
         return (self.experiment.scenario, self.experiment.variant, self.seed)
 
 
+def circumstances() -> dict[str, Any]:
+    """What a drive was driven on, when, and beside what load."""
+    return {
+        "machine": processor(), "commit": commit(), "at": time.time(), "load": os.getloadavg()[0]
+    }  # fmt: skip
+
+
 def carry_out(job: Job, film: Path | None = None) -> Result:
     """Drive once, and again where the twin was disturbed.
 
     Args:
         job: what.
         film: where the last drive's video is to be, without its suffix; None: none is drawn.
+
+    Raises:
+        RuntimeError: a process did not start, or died, in each of the tries.
     """
     e = job.experiment
     disturbed: list[dict[str, Any]] = []
@@ -96,8 +108,17 @@ def carry_out(job: Job, film: Path | None = None) -> Result:
             e.scenario, seed=job.seed, cycle=e.cycle, object_speed=e.object_speed, threads=1,
             ahead=e.ahead,
         )  # fmt: skip
-        with chain:
-            told = chain.run(e.seconds).summary()
+        try:
+            with chain:
+                told = chain.run(e.seconds).summary()
+        except RuntimeError:
+            # a machine on which it does not even start, or go on, is disturbed
+            disturbed.append(
+                {"twin_latest": math.inf, "collisions_moving": 0, "reached_goal": False}
+            )
+            if len(disturbed) == TRIES:
+                raise
+            continue
         if told["interrupted"]:
             raise KeyboardInterrupt
         if told["twin_latest"] <= LATE:
@@ -113,7 +134,7 @@ def carry_out(job: Job, film: Path | None = None) -> Result:
     return told | {
         "scenario": scenario, "variant": variant, "seed": seed, "error": None, "figure": e.figure,
         "disturbed": disturbed, "quiet": len(disturbed) < TRIES,
-        "timings": {"machine": processor(), "commit": commit(), "at": time.time()},
+        "timings": circumstances(),
     }  # fmt: skip
 
 

@@ -34,10 +34,9 @@ from hardware.executor_settings import ExecutorSettings
 from hardware.letterbox import Letterbox
 from hardware.stop_button import StopButton
 from hardware.twin import Chain
-from hardware.twin_experiments import LATE, TRIES
+from hardware.twin_experiments import LATE, TRIES, circumstances
 from hardware.twin_process import TruthReader
 from passpmp_ti import door
-from passpmp_ti.bench.machine import commit, processor
 from passpmp_ti.compare.job import Key, Result
 from passpmp_ti.compare.ledger import Ledger
 
@@ -224,7 +223,7 @@ def carry_out(rig: TwinRig, kind: Kind, number: int, rng: np.random.Generator) -
         **asdict(run), "scenario": SCENARIO, "variant": kind.name, "seed": number,
         "error": None, "touched": touched, "late": rig.late, "disturbed": disturbed,
         "quiet": len(disturbed) < TRIES,
-        "timings": {"machine": processor(), "commit": commit(), "at": time.time()},
+        "timings": circumstances(),
     }  # fmt: skip
 
 

@@ -21,6 +21,8 @@ from hardware.twin_settings import executor_of
 from passpmp_ti.compare.job import Result
 from passpmp_ti.compare.ledger import EPISODES, Ledger
 
+FILMS = "twin"
+"""The folder of the videos, beside the page."""
 PERIOD = ChairNature().period
 HEAD = """# What was driven on the twin
 
@@ -175,14 +177,20 @@ def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     return "\n".join("| " + " | ".join(line) + " |" for line in lines)
 
 
-def page(driven: Mapping[str, Iterable[Result]], machines: Iterable[str]) -> str:
+def page(
+    driven: Mapping[str, Iterable[Result]], machines: Iterable[str], films: Iterable[str] = ()
+) -> str:
     """The page.
 
     Args:
         driven: results of "experiments" and of "faults", where there are any.
-        machines: what it was driven on.
+        machines: what it was driven on, and at which commits.
+        films: videos, from where the page lies.
     """
     parts = [HEAD, f"Driven on {'; '.join(sorted(set(machines)))}."]
+    links = ", ".join(f"[{Path(film).stem}]({film})" for film in films)
+    if links:
+        parts.append(f"Videos, twice as fast as it happened: {links}.")
     if "experiments" in driven:
         parts.append(experiments(driven["experiments"]))
     if "faults" in driven:
@@ -208,8 +216,14 @@ def main() -> int:
             print(f"--{name} {folder} holds nothing that was driven", file=sys.stderr)
             return 2
         driven[name] = list(Ledger(folder, {}).results.values())
-    machines = [f["timings"]["machine"] for found in driven.values() for f in found]
-    given.page.write_text(page(driven, machines), encoding="utf-8")
+    beside = given.page.parent / FILMS
+    films = [f"{FILMS}/{film.name}" for film in sorted(beside.glob("*.mp4"))]
+    circumstances = [f["timings"] for found in driven.values() for f in found]
+    loads = [told["load"] for told in circumstances if "load" in told]
+    machines = [f"{told['machine']}, commit {told['commit']}" for told in circumstances]
+    if loads:
+        machines = [f"{m}, beside a load of {min(loads):.0f} to {max(loads):.0f}" for m in machines]
+    given.page.write_text(page(driven, machines, films), encoding="utf-8")
     print(f"written to {given.page}")
     return 0
 

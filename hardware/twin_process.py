@@ -135,7 +135,7 @@ class TruthReader:
 class TwinProcess:
     """Starts a twin and looks after it."""
 
-    def __init__(self, config: TwinConfig, *, within: float = 30.0) -> None:
+    def __init__(self, config: TwinConfig, *, within: float = 120.0) -> None:
         """
         Args:
             config: what it is told.

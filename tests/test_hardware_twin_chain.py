@@ -287,6 +287,9 @@ def stood_in(monkeypatch, told):
             pass
 
         def run(self, seconds):
+            if left[0] is None:
+                left.pop(0)
+                raise RuntimeError("the twin did not start")
             self.summary = lambda: left.pop(0)
             return self
 
@@ -313,6 +316,14 @@ def test_a_drive_that_stays_disturbed_counts_and_is_called_so(monkeypatch):
     assert len(left) == 1
     assert not found["quiet"]
     assert "1 of the 1 drives were disturbed to the last" in twin_page.experiments([found])
+
+
+def test_what_does_not_start_is_tried_again_and_counted(monkeypatch):
+    stood_in(monkeypatch, [None, told_by_a_drive()])
+    assert len(twin_experiments.carry_out(Job(EXPERIMENTS[0], 0))["disturbed"]) == 1
+    stood_in(monkeypatch, [None] * TRIES)
+    with pytest.raises(RuntimeError, match="did not start"):
+        twin_experiments.carry_out(Job(EXPERIMENTS[0], 0))
 
 
 def test_what_was_driven_is_not_driven_again(monkeypatch, tmp_path, capsys):
