@@ -99,6 +99,16 @@ def test_more_walkers_change_nothing_for_those_who_wait():
     )
 
 
+def test_an_occluder_of_another_leg_stands_in_nobodys_way_across():
+    # of 400 seeds the only one whose first occluders do
+    for corner in corners_of(95):
+        for other in corners_of(95):
+            ways = np.linspace(*corner.ambush.way, 200)
+            apart = np.hypot(*(ways - other.centre).T)
+            assert apart.min() >= other.size + corner.ambush.radius - 1e-3
+    assert world_of(10, 95).movers.positions(TIMES).shape == (len(TIMES), 16, 2)
+
+
 def test_walls_about_the_square_leave_room_for_everybody():
     world = crowd(20, 0, walled=True).build(0)[0]
     assert len(world.outline) == len(world_of(20, 0).outline) + 4

@@ -184,9 +184,20 @@ def _gap(begin: np.ndarray, end: np.ndarray, corners: Sequence[Corner]) -> float
 def draw_corners(generator: np.random.Generator) -> list[Corner]:
     """Occluders along the route, and people whom nobody on the route sees until they step out.
 
+    Where an occluder of another leg stands in somebody's way across, all are drawn anew.
+
     Raises:
         ValueError: no room was found, which a route and sizes like ours do not let happen.
     """
+    for _ in range(TRIES):
+        corners = _drawn_one_by_one(generator)
+        ways = [(corner.ambush.way, corner.ambush.radius) for corner in corners]
+        if all(_gap(way[0], way[1], corners) >= radius for way, radius in ways):
+            return corners
+    raise ValueError("no occluders were found that leave everybody a way across the route")
+
+
+def _drawn_one_by_one(generator: np.random.Generator) -> list[Corner]:
     corners: list[Corner] = []
     for leg in range(len(ROUTE) - 1):
         for _ in range(OCCLUDERS):
