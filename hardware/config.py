@@ -13,7 +13,14 @@ from hardware.base import BaseLimits, check_fits
 from hardware.config_parts import BaseConfig, Emulated, Lidar, Measured
 from hardware.executor_settings import ExecutorSettings
 from hardware.follower import FollowerSettings
-from hardware.margins import APART, HALF_SWEEP, executor_settings, with_margins
+from hardware.margins import (
+    APART,
+    HALF_SWEEP,
+    executor_settings,
+    longest_guess,
+    unforeseen,
+    with_margins,
+)
 from hardware.merge import check_stamp_error, needed_stamp_error
 from hardware.scip_settings import ScipSettings
 from passpmp_ti.robots import DifferentialDrive
@@ -112,6 +119,11 @@ class DriveConfig:
         )
 
     @property
+    def guess(self) -> float:
+        """How long after the newest odometry the robot's state may be told [s]."""
+        return longest_guess(self.executor_settings, self.base.odometry_period)
+
+    @property
     def heading_error(self) -> float:
         """Greatest error of a range finder's heading [rad]: that of what is told, and what the
         robot turned otherwise than its wheels said since."""
@@ -119,11 +131,10 @@ class DriveConfig:
 
     @property
     def _unforeseen(self) -> float:
-        """What a wheel does otherwise than it did at the newest odometry, until the sweep's middle
-        or end [m]."""
+        """What a wheel does otherwise than it did at the newest odometry, until a sweep's first or
+        last beam is measured [m]."""
         # wheels may change faster than they surely brake: a measured distance has delays in it
-        change = BRISK * self.limits.acceleration
-        return 0.5 * change * (self.base.odometry_period + HALF_SWEEP) ** 2
+        return unforeseen(BRISK * self.limits.acceleration, self.guess + HALF_SWEEP)
 
     @property
     def planner_settings(self) -> Settings:

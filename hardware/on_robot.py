@@ -96,7 +96,9 @@ class RobotDrive:
                 open_.callback(ended, self._button, 1.0)
                 if said != READY:
                     raise RuntimeError(f"the stop button did not start: {said!r}")
-            self.link = open_.enter_context(PlannerLink(config.directory, track=config.robot.track))
+            self.link = open_.enter_context(
+                PlannerLink(config.directory, track=config.robot.track, guess=config.guess)
+            )
             self.clients = [
                 open_.enter_context(
                     SteadyClient(

@@ -70,7 +70,9 @@ def test_what_was_measured_comes_to_margins():
     assert executor.bound == pytest.approx(1.5 * m.tracking_error)
     assert planner.tracking_error >= executor.bound + executor.reaction
     # wheels may change by twice what they brake while odometry is on its way
-    wheels = 0.5 * 2 * config.limits.acceleration * (0.01 + HALF_SWEEP) ** 2
+    # 10 ms to be measured, two of the executor's periods to be told, half of a sweep
+    assert config.guess == pytest.approx(0.03)
+    wheels = 0.5 * 2 * config.limits.acceleration * (config.guess + HALF_SWEEP) ** 2
     needed = m.localisation_error + wheels
     assert needed <= planner.localisation_error < needed + 0.01
     # each scan holds the heading's error itself
