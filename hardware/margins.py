@@ -15,8 +15,8 @@ APART = 0.0135
 HASTE = 0.02
 """What a cycle needs beside planning, from the scan's stamp to the executor [s]."""
 HALF_SWEEP = 0.015
-"""A pose is that of a sweep's middle, as well as that is known; no beam is farther from it than this
-[s]: half of `ScipSettings.stamp_error`."""
+"""A pose is that of a sweep's middle, as well as that is known; no beam is farther from it than
+this [s]: half of `ScipSettings.stamp_error`."""
 
 
 def with_margins(

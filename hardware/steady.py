@@ -45,12 +45,13 @@ def steadied(scan: Scan, shift: float, turn: float) -> Scan:
         turn: greatest error of a beam's bearing, turning and error of heading together [rad].
 
     Returns:
-        The scan with ranges that are never longer. Beams at both ends, past which nobody may have
+        The scan with ranges that are never longer, `range_max` too: who met nothing looked no
+        farther than that from where it was. Beams at both ends, past which nobody may have
         looked, are lost, and those that may have looked past an edge: a return there would stand
         where nothing stands.
 
     Raises:
-        ValueError: a bound that is negative or no number.
+        ValueError: a bound that is negative or no number, or a shift of `range_max` or more.
     """
     door.finite("steadied", "shift", shift, least=0.0, unit="m")
     door.finite("steadied", "turn", turn, least=0.0, unit="rad")
@@ -69,10 +70,14 @@ def steadied(scan: Scan, shift: float, turn: float) -> Scan:
     # Among the beams about a lost one, what it would have told is never nearer than both that are
     # left: who spreads over it spreads over one of them as well.
     told[told < nearer - EDGE] = 0.0
-    beside = turn + math.asin(min(shift / OWN, 1.0))
-    ends = math.ceil(beside / scan.angle_increment) + 1
-    told[:ends] = told[-ends:] = 0.0
-    return replace(scan, ranges=told)
+    beside = math.ceil((turn + math.asin(min(shift / OWN, 1.0))) / scan.angle_increment) + 1
+    # Beams that are lost side by side may hide what no neighbour meets: places that only they
+    # looked at lie beside them as the edge of the sweep lies beside its ends.
+    wide = lost & (np.append(lost[1:], False) | np.append(False, lost[:-1]))
+    about = np.convolve(wide, np.ones(2 * beside + 1))[beside : beside + len(told)]
+    told[about > 0.5] = 0.0
+    told[:beside] = told[-beside:] = 0.0
+    return replace(scan, ranges=told, range_max=scan.range_max - shift)
 
 
 class SteadyClient(ScipClient):
@@ -107,12 +112,17 @@ class SteadyClient(ScipClient):
             return None
         # no beam is measured farther from the pose's moment than this
         half = 0.5 * self.settings.stamp_error
+        nothing = replace(scan, ranges=np.full_like(scan.ranges, math.nan))
         state = self._state_at(scan.stamp - half)
         if state is None:
-            return replace(scan, ranges=np.full_like(scan.ranges, math.nan))
+            return nothing
         right, left = (float(v) for v in state[3:])
         rolling = BELIEVED * 0.5 * abs(right + left) + SPEED_ERROR
         turning = (BELIEVED * abs(right - left) + SPEED_ERROR) / self._track
-        return steadied(
-            scan, half * (rolling + turning * self._arm), half * turning + self._heading_error
-        )
+        # a heading that is off has the sensor elsewhere too, on the end of its arm
+        shift = half * rolling + (half * turning + self._heading_error) * self._arm
+        turn = half * turning + self._heading_error
+        # speeds that are none would break the planner instead of the executor's trust
+        if not (shift < scan.range_max and turn < math.pi):
+            return nothing
+        return steadied(scan, shift, turn)

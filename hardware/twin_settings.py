@@ -72,8 +72,8 @@ def guess_of(cycle: float, nature: ChairNature) -> float:
 
 
 def unforeseen_of(cycle: float, nature: ChairNature) -> float:
-    """What a wheel does otherwise than it did at the newest odometry, for as long as a state is told
-    after that [m]: the order that it follows changes no faster."""
+    """What a wheel does otherwise than it did at the newest odometry, for as long as a state is
+    told after that [m]: the order that it follows changes no faster."""
     return unforeseen(nature.limits.acceleration, guess_of(cycle, nature))
 
 
