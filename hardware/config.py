@@ -139,13 +139,15 @@ class DriveConfig:
     @property
     def planner_settings(self) -> Settings:
         """The planner's, with the margins of what was measured. What the robot moves and turns in a
-        sweep, and the error of its heading, is taken from the scans themselves (`steady.py`)."""
+        sweep, and the error of its heading, is taken from the scans themselves (`steady.py`); what
+        that error moves of the body, the centres of its discs, is of the place."""
         m = self.measured
+        swung = self.robot.overhang * self.heading_error
         return with_margins(
             self.planner,
             self.executor_settings,
             cycle=self.planner.cycle,
-            localisation_error=m.localisation_error + self._unforeseen,
+            localisation_error=m.localisation_error + self._unforeseen + swung,
             range_noise=max(lidar.range_noise for lidar in self.lidars),
             scan_age=self.scan_age,
             top_speed=0.0,

@@ -81,6 +81,22 @@ def test_what_was_measured_comes_to_margins():
     assert executor.follower.delay == pytest.approx(m.order_delay + 0.005)
 
 
+def test_a_heading_that_is_off_swings_the_body():
+    config = read_config(EXAMPLES / "wheelchair.yaml")
+    long = replace(config.robot, discs=((-0.9, 0.4), (0.9, 0.4)))
+    swung = replace(config, robot=long)
+    needed = config.measured.localisation_error + 0.9 * swung.heading_error
+    assert swung.planner_settings.localisation_error > needed
+
+
+@pytest.mark.parametrize("field", ["discs", "wheel_speed", "acceleration", "track"])
+def test_nothing_of_a_robots_body_and_wheels_is_taken_for_granted(field, tmp_path):
+    head, robot = CHAIR.split("lidars:", 1)[0].splitlines(), CHAIR.split("lidars:", 1)[1]
+    kept = "\n".join(one for one in head if not one.strip().startswith(f"{field}:"))
+    with pytest.raises(ValueError, match=f"robot.{field} is missing"):
+        read_config(written(tmp_path, f"{kept}\nlidars:{robot}"))
+
+
 @pytest.mark.parametrize(
     ("field", "margin"),
     [
