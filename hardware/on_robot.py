@@ -232,7 +232,8 @@ class RobotDrive:
         if not self.executor.alive:
             return "the executor is gone; the base brakes by itself"
         if self._button is not None and self._button.poll() is not None:
-            return "the stop button is gone, and was pressed as it went"
+            # it presses as it goes, unless it was killed
+            return f"the stop button is gone; {self._press()}"
         return ""
 
     def _to_rest(self, why: str, heard: Interrupts) -> str:
