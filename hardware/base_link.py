@@ -37,6 +37,7 @@ class BaseServer:
         self._told: Odometry | None = None
         self._obeyed: float | None = None  # when what is obeyed was sent
         self._held_up = False  # stopped because nothing fresh came, not because somebody said so
+        self._told_to_stop = False
         self.garbled = 0
         """Messages that could not be read."""
 
@@ -55,7 +56,8 @@ class BaseServer:
             self._hear(message, sender)
         if self._obeyed is not None and self._old(self._obeyed):
             self._base.stop()
-            self._obeyed, self._held_up = None, True
+            # orders that a stopped base did not obey end too: that lets nothing go
+            self._obeyed, self._held_up = None, not self._told_to_stop
         odometry = self._base.odometry()
         if odometry is not None and odometry is not self._told and self._driver:
             self._told = odometry
@@ -73,7 +75,7 @@ class BaseServer:
         if isinstance(body, Stop):
             # whoever says so
             self._base.stop()
-            self._obeyed, self._held_up = None, False
+            self._obeyed, self._held_up, self._told_to_stop = None, False, True
             return
         if not isinstance(body, (Drive, Reset)) or message.session < self._session:
             return
@@ -89,7 +91,7 @@ class BaseServer:
             self._base.drive(body.right, body.left)
         elif isinstance(body, Reset):
             self._base.reset()
-            self._held_up = False
+            self._held_up = self._told_to_stop = False
 
     def _old(self, sent_at: float) -> bool:
         # a number that is none is no fresh one

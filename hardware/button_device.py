@@ -2,8 +2,9 @@
 
     python -m hardware.button_device '{"directory": "/run/passpmp", "device": "/dev/input/..."}'
 
-A process of its own: neither planner nor kernels hold it up. A device that is gone stops the robot
-too: a button that was pulled out can stop nobody.
+A process of its own: neither planner nor kernels hold it up. It outlives a planner that dies, for
+as long as the executor carries on to rest. A device that is gone stops the robot too: a button that
+was pulled out can stop nobody.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ import struct
 import sys
 from pathlib import Path
 
+from hardware.executor_process import busy
 from hardware.stop_button import StopButton
 
 EVENT = struct.Struct("@llHHi")
@@ -35,7 +37,7 @@ def pressed(data: bytes) -> bool:
 
 
 def run(directory: Path, device: Path, parent: int) -> None:
-    """Watch the device until whoever started this process is gone.
+    """Watch the device until whoever started this process is gone, and the executor is.
 
     Raises:
         OSError: it cannot be read at all.
@@ -43,7 +45,7 @@ def run(directory: Path, device: Path, parent: int) -> None:
     source = os.open(device, os.O_RDONLY | os.O_NONBLOCK)
     os.write(sys.stdout.fileno(), READY)
     with StopButton(directory) as button:
-        while os.getppid() == parent:
+        while os.getppid() == parent or busy(directory):
             if not select.select([source], [], [], LOOK)[0]:
                 continue
             try:

@@ -168,7 +168,7 @@ def poser(link: PlannerLink, of_robot: Callable[[np.ndarray], Pose]) -> Callable
     def pose_at(when: float) -> Pose:
         state = link.state_at(when)
         if state is None:
-            link.poll(timeout=0.005)
+            link.poll(timeout=ASK)
             state = link.state_at(when)
         return NOWHERE if state is None else of_robot(state)
 

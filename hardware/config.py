@@ -13,7 +13,15 @@ from hardware.base import BaseLimits, check_fits
 from hardware.config_parts import BaseConfig, Emulated, Lidar, Measured
 from hardware.executor_settings import ExecutorSettings
 from hardware.follower import FollowerSettings
-from hardware.margins import APART, HALF_SWEEP, executor_settings, with_margins
+from hardware.margins import (
+    APART,
+    BRISK,
+    HALF_SWEEP,
+    executor_settings,
+    longest_guess,
+    unforeseen,
+    with_margins,
+)
 from hardware.merge import check_stamp_error, needed_stamp_error
 from hardware.scip_settings import ScipSettings
 from passpmp_ti.robots import DifferentialDrive
@@ -23,8 +31,6 @@ FOR_STEERING = 0.9
 """Share of the measured braking that may be planned with; the rest steers back to the plan."""
 RESERVE = 1.5
 """The executor lets the robot off its path by so much more than was ever measured."""
-BRISK = 2.0
-"""Wheels change their speed no more than so many times as fast as they were seen to brake."""
 LEAST_BOUND = 0.02
 """[m]; odometry itself has noise."""
 LOST_ODOMETRY = 3
@@ -112,6 +118,11 @@ class DriveConfig:
         )
 
     @property
+    def guess(self) -> float:
+        """How long after the newest odometry the robot's state may be told [s]."""
+        return longest_guess(self.executor_settings, self.base.odometry_period)
+
+    @property
     def heading_error(self) -> float:
         """Greatest error of a range finder's heading [rad]: that of what is told, and what the
         robot turned otherwise than its wheels said since."""
@@ -119,22 +130,23 @@ class DriveConfig:
 
     @property
     def _unforeseen(self) -> float:
-        """What a wheel does otherwise than it did at the newest odometry, until the sweep's middle
-        or end [m]."""
+        """What a wheel does otherwise than it did at the newest odometry, until a sweep's first or
+        last beam is measured [m]."""
         # wheels may change faster than they surely brake: a measured distance has delays in it
-        change = BRISK * self.limits.acceleration
-        return 0.5 * change * (self.base.odometry_period + HALF_SWEEP) ** 2
+        return unforeseen(BRISK * self.limits.acceleration, self.guess + HALF_SWEEP)
 
     @property
     def planner_settings(self) -> Settings:
         """The planner's, with the margins of what was measured. What the robot moves and turns in a
-        sweep, and the error of its heading, is taken from the scans themselves (`steady.py`)."""
+        sweep, and the error of its heading, is taken from the scans themselves (`steady.py`); what
+        that error moves of the body, the centres of its discs, is of the place."""
         m = self.measured
+        swung = self.robot.overhang * self.heading_error
         return with_margins(
             self.planner,
             self.executor_settings,
             cycle=self.planner.cycle,
-            localisation_error=m.localisation_error + self._unforeseen,
+            localisation_error=m.localisation_error + self._unforeseen + swung,
             range_noise=max(lidar.range_noise for lidar in self.lidars),
             scan_age=self.scan_age,
             top_speed=0.0,

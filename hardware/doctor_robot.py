@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import fcntl
 import importlib
 import math
 import os
@@ -21,7 +20,8 @@ from hardware.config import DriveConfig
 from hardware.config_parts import Lidar
 from hardware.devices import devices
 from hardware.doctor_finding import FAIL, OK, WARN, Finding
-from hardware.executor_process import check_private
+from hardware.executor import LATCH
+from hardware.executor_process import busy, check_private
 from hardware.letterbox import LONGEST_NAME
 from hardware.scip_client import ScipClient
 from hardware.scip_settings import ScipSettings
@@ -104,7 +104,7 @@ def directory(path: Path) -> Finding:
 def button(config: DriveConfig) -> Finding:
     """The device of the stop button, if there is one."""
     by_hand = f"python -m hardware.stop_button {config.directory}"
-    if (config.directory / "stopped").exists():
+    if (config.directory / LATCH).exists():
         return Finding(
             "stop button", FAIL, "it was pressed, and still is", f"let go of it: {by_hand} --reset"
         )
@@ -130,21 +130,6 @@ def map_of(config: DriveConfig) -> Finding:
     rows, columns = known.occupied.shape
     size = f"{columns * known.resolution:.1f} x {rows * known.resolution:.1f} m"
     return Finding("map", OK, f"{config.map}: {size}, {int(known.occupied.sum())} cells that stay")
-
-
-def busy(path: Path) -> bool:
-    """Whether an executor works in a directory."""
-    try:
-        descriptor = os.open(path, os.O_RDONLY)
-    except OSError:
-        return False
-    try:
-        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
-        return True
-    finally:
-        os.close(descriptor)
-    return False
 
 
 def range_finder(lidar: Lidar, settings: ScipSettings) -> Finding:

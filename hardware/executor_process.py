@@ -218,6 +218,21 @@ def check_private(directory: Path) -> None:
         )
 
 
+def busy(directory: Path) -> bool:
+    """Whether an executor works in a directory."""
+    try:
+        descriptor = os.open(directory, os.O_RDONLY)
+    except OSError:
+        return False
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return True
+    finally:
+        os.close(descriptor)
+    return False
+
+
 def _alone(directory: Path) -> int:
     """A descriptor that keeps all other executors out of a directory while it is open: two would
     take each other's sockets away, and the button would reach only one.

@@ -35,7 +35,8 @@ REMEMBERED = 64
 LATELY = 0.5
 """A status is believed for this long [s]; a planner polls in every cycle."""
 LONGEST_GUESS = 0.1
-"""The robot's state is told for times at most this long after the newest odometry [s]."""
+"""The robot's state is told for times at most this long after the newest odometry [s], where nobody
+says less: what its wheels may do otherwise meanwhile has to be in a margin."""
 
 
 class PlannerLink:
@@ -54,18 +55,24 @@ class PlannerLink:
     """
 
     def __init__(
-        self, directory: Path, *, track: float, clock: Callable[[], float] = time.monotonic
+        self,
+        directory: Path,
+        *,
+        track: float,
+        guess: float = LONGEST_GUESS,
+        clock: Callable[[], float] = time.monotonic,
     ) -> None:
         """
         Args:
             directory: of the executor's sockets.
             track: distance between the driven wheels [m].
+            guess: a state is told for times at most this long after the newest odometry [s].
             clock: seconds that never go back, the same for all processes.
         """
         self.status: Status | None = None
         """The newest that came."""
         self._clock = clock
-        self._track = track
+        self._track, self._guess = track, guess
         self._executor = directory / ADDRESS
         self._session = time.monotonic_ns()
         self._box = Letterbox(directory / f"planner-{self._session:x}")
@@ -159,7 +166,7 @@ class PlannerLink:
             None where nothing is known of that time.
         """
         known = self._odometry
-        if not known or not known[0].stamp <= time <= known[-1].stamp + LONGEST_GUESS:
+        if not known or not known[0].stamp <= time <= known[-1].stamp + self._guess:
             return None
         after = next((n for n, o in enumerate(known) if o.stamp > time), None)
         if after is None:

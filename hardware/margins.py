@@ -14,9 +14,11 @@ APART = 0.0135
 """Stamps of two range finders that are joined differ by this at the most [s]."""
 HASTE = 0.02
 """What a cycle needs beside planning, from the scan's stamp to the executor [s]."""
-HALF_SWEEP = 0.01
-"""A pose is that of a sweep's middle; no beam is farther from it than this [s]: 9.5 ms of a
-UST-10LX."""
+HALF_SWEEP = 0.015
+"""A pose is that of a sweep's middle, as well as that is known; no beam is farther from it than
+this [s]: half of `ScipSettings.stamp_error`."""
+BRISK = 2.0
+"""Wheels change their speed no more than so many times as fast as they were seen to brake."""
 
 
 def with_margins(
@@ -54,6 +56,27 @@ def with_margins(
         range_noise=range_noise,
         stamp_error=scan_age + executor.rest_late,
     )
+
+
+def longest_guess(executor: ExecutorSettings, odometry_period: float) -> float:
+    """How long after the newest odometry the robot's state may be told [s]: less was not known yet
+    at times, and what is told for later than that would be in no margin.
+
+    Args:
+        executor: looks at the base in each of its periods, and tells.
+        odometry_period: from one odometry to the next [s].
+    """
+    return odometry_period + 2.0 * executor.period
+
+
+def unforeseen(change: float, duration: float) -> float:
+    """How far a wheel gets by then from where it would be if it went on as it did [m].
+
+    Args:
+        change: no wheel changes its speed faster than this [m/s^2].
+        duration: since it was measured [s].
+    """
+    return 0.5 * change * duration**2
 
 
 def executor_settings(cycle: float, **changes: Any) -> ExecutorSettings:

@@ -25,7 +25,8 @@ from hardware.base import Base, Odometry
 from hardware.config import DriveConfig
 from hardware.config_file import read_config
 from hardware.devices import devices
-from hardware.doctor_robot import busy
+from hardware.executor import LATCH
+from hardware.executor_process import busy
 from hardware.margins import deceleration
 
 TICK = 0.01
@@ -103,15 +104,17 @@ def drive_and_stop(
             known.append(here)
 
     base.reset()
-    began = clock()
+    began = said = clock()
     while (since := clock() - began) < speed / acceleration + STEADY:
         wanted = min(acceleration * since, speed)
+        said = clock()
         base.drive(wanted, wanted)
         look()
         sleep(TICK)
         if not known and since > STEADY:
             raise ValueError("measure: no odometry comes; is what serves the base running?")
-    told = clock()
+    # a silence begins with the last thing that was said
+    told = said if silent else clock()
     while not _rests(known, told):
         if not silent:
             base.drive(0.0, 0.0)
@@ -212,6 +215,11 @@ def main() -> int:
             )
         if busy(config.directory):
             raise ValueError(f"an executor works in {config.directory}; end that drive first")
+        if (config.directory / LATCH).exists():
+            raise ValueError(
+                "the emergency stop is pressed; let go of it with"
+                f" python -m hardware.stop_button {config.directory} --reset"
+            )
         found = _measured(config, speed, silent=given.silent)
     except (ValueError, RuntimeError) as error:
         print(error, file=sys.stderr)

@@ -97,7 +97,9 @@ class RobotDrive:
                 open_.callback(ended, self._button, 1.0)
                 if said != READY:
                     raise RuntimeError(f"the stop button did not start: {said!r}")
-            self.link = open_.enter_context(PlannerLink(config.directory, track=config.robot.track))
+            self.link = open_.enter_context(
+                PlannerLink(config.directory, track=config.robot.track, guess=config.guess)
+            )
             self.clients = [
                 open_.enter_context(
                     SteadyClient(
@@ -242,7 +244,8 @@ class RobotDrive:
         if not self.executor.alive:
             return "the executor is gone; the base brakes by itself"
         if self._button is not None and self._button.poll() is not None:
-            return "the stop button is gone, and was pressed as it went"
+            # it presses as it goes, unless it was killed
+            return f"the stop button is gone; {self._press()}"
         return ""
 
     def _to_rest(self, why: str, heard: Interrupts) -> str:

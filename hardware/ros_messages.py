@@ -311,7 +311,8 @@ def static_map_of(message: Any) -> tuple[str, StaticMap]:
     occupied = data.reshape(info.height, info.width) == OCCUPIED
     # the shortest number that is this float32: 0.05 and not 0.0500000007, or a ring of cells that
     # lie just as far from a wall as is tolerated would be lost; 1000 cells shift by 1 um
-    resolution = float(str(np.float32(info.resolution)))
+    with np.errstate(over="ignore"):
+        resolution = float(str(np.float32(info.resolution)))
     try:
         return message.header.frame_id, StaticMap(occupied, resolution, (x, y, yaw))
     except ValueError as why:

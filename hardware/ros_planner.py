@@ -141,7 +141,9 @@ class Planner:
         with ExitStack() as open_:
             executor = open_.enter_context(ExecutorProcess(config))
             link = open_.enter_context(
-                PlannerLink(settings.directory, track=settings.robot.track)
+                PlannerLink(
+                    settings.directory, track=settings.robot.track, guess=settings.guess
+                )
             )
             put_forward("the planner", PRIORITY)
             due = told_at = shown_at = time.monotonic()

@@ -15,10 +15,18 @@ from hardware.base import BaseLimits, check_fits
 from hardware.config import usual_directory
 from hardware.executor_settings import ExecutorSettings
 from hardware.follower import FollowerSettings
-from hardware.margins import APART, HASTE, executor_settings, with_margins
+from hardware.margins import (
+    APART,
+    BRISK,
+    HASTE,
+    executor_settings,
+    longest_guess,
+    unforeseen,
+    with_margins,
+)
 from hardware.ros_clock import JUMP
 from hardware.ros_messages import Pose, Untrusted
-from hardware.steady import bounds, steadied
+from hardware.steady import bounds, steadied_or_lost
 from passpmp_ti import door
 from passpmp_ti.robots import DifferentialDrive
 from passpmp_ti.scan import Scan
@@ -73,6 +81,9 @@ class RosSettings:
     """Likewise of its heading, and of how a range finder is mounted [rad]."""
     range_error: float = 0.04
     """Greatest error of a range [m]."""
+    odometry_period: float = 0.02
+    """From one odometry to the next [s]. Longer after one than that, and what the executor takes to
+    hand it on, no pose is told: scans that would need one are not believed."""
 
     # planning
     mode: str = "conservative"
@@ -106,7 +117,8 @@ class RosSettings:
             raise ValueError(f"{name}.scans must be topics, as ['scan']; got {self.scans!r}")
         object.__setattr__(self, "scans", tuple(self.scans))
         for above_0 in (
-            "range_max", "sweep", "oldest", "cycle", "show_every", "show_cell", "show_reach",
+            "range_max", "sweep", "oldest", "cycle", "odometry_period", "show_every", "show_cell",
+            "show_reach",
         ):  # fmt: skip
             door.finite(name, above_0, getattr(self, above_0), above=0.0)
         for least_0 in (
@@ -187,8 +199,20 @@ class RosSettings:
             mount: of the range finder on the robot.
         """
         _, turning = bounds(float(state[3]), float(state[4]), self.robot.track)
-        turn = turning * self._astray
-        return steadied(scan, turn * math.hypot(*mount[:2]), turn + self.heading_error)
+        turn = turning * self._astray + self.heading_error
+        turn += 2.0 * self._unforeseen / self.robot.track
+        return steadied_or_lost(scan, turn * math.hypot(*mount[:2]), turn)
+
+    @property
+    def guess(self) -> float:
+        """How long after the newest odometry the robot's state may be told [s]."""
+        return longest_guess(self.executor_settings(), self.odometry_period)
+
+    @property
+    def _unforeseen(self) -> float:
+        """What a wheel does otherwise than it did at the newest odometry, until a beam is measured
+        [m]."""
+        return unforeseen(BRISK * self.limits.acceleration, self.guess + self._astray)
 
     @property
     def _astray(self) -> float:
@@ -215,7 +239,9 @@ class RosSettings:
             Settings.for_robot(self.robot, mode=self.mode, object_speed=self.object_speed),
             executor,
             cycle=self.cycle,
-            localisation_error=self.pose_error + self.robot.top_speed * self._astray,
+            localisation_error=self.pose_error
+            + self.robot.top_speed * self._astray
+            + self._unforeseen,
             range_noise=self.range_error,
             scan_age=self.scan_age,
             top_speed=0.0,  # what it rolls in a sweep is in already

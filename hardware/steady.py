@@ -57,12 +57,13 @@ def steadied(scan: Scan, shift: float, turn: float) -> Scan:
         turn: greatest error of a beam's bearing, turning and error of heading together [rad].
 
     Returns:
-        The scan with ranges that are never longer. Beams at both ends, past which nobody may have
+        The scan with ranges that are never longer, `range_max` too: who met nothing looked no
+        farther than that from where it was. Beams at both ends, past which nobody may have
         looked, are lost, and those that may have looked past an edge: a return there would stand
         where nothing stands. A scan of a whole turn has no ends.
 
     Raises:
-        ValueError: a bound that is negative or no number.
+        ValueError: a bound that is negative or no number, or a shift of `range_max` or more.
     """
     door.finite("steadied", "shift", shift, least=0.0, unit="m")
     door.finite("steadied", "turn", turn, least=0.0, unit="rad")
@@ -73,12 +74,13 @@ def steadied(scan: Scan, shift: float, turn: float) -> Scan:
     sideways[lost | (shift == 0.0)] = 0.0
     # up, and a step more: every rounding widens
     reach = np.ceil((turn + sideways) / scan.angle_increment).astype(np.int64) + 1
+    beside = math.ceil((turn + math.asin(min(shift / OWN, 1.0))) / scan.angle_increment) + 1
     around = 0
     if abs(len(nearer) * scan.angle_increment - math.tau) <= scan.angle_increment:
         # first and last may look along one bearing: counted from one to the other, a step is lost
-        reach += 1
-        around = min(int(reach.max()), len(nearer))
-        nearer, reach = np.pad(nearer, around, "wrap"), np.pad(reach, around, "wrap")
+        reach, beside = reach + 1, beside + 1
+        around = min(max(int(reach.max()), beside), len(nearer))
+        nearer, reach, lost = (np.pad(each, around, "wrap") for each in (nearer, reach, lost))
     told = nearer.copy()
     for off in range(1, min(int(reach.max()), len(told) - 1) + 1):
         spread = np.where(reach >= off, nearer, np.inf)
@@ -87,12 +89,24 @@ def steadied(scan: Scan, shift: float, turn: float) -> Scan:
     # Among the beams about a lost one, what it would have told is never nearer than both that are
     # left: who spreads over it spreads over one of them as well.
     told[told < nearer - EDGE] = 0.0
+    # Beams that are lost side by side may hide what no neighbour meets: places that only they
+    # looked at lie beside them as the edge of the sweep lies beside its ends.
+    wide = lost & (np.append(lost[1:], False) | np.append(False, lost[:-1]))
+    about = np.convolve(wide, np.ones(2 * beside + 1))[beside : beside + len(told)]
+    told[about > 0.5] = 0.0
     if around:
-        return replace(scan, ranges=told[around:-around])
-    beside = turn + math.asin(min(shift / OWN, 1.0))
-    ends = math.ceil(beside / scan.angle_increment) + 1
-    told[:ends] = told[-ends:] = 0.0
-    return replace(scan, ranges=told)
+        told = told[around:-around]
+    else:
+        told[:beside] = told[-beside:] = 0.0
+    return replace(scan, ranges=told, range_max=scan.range_max - shift)
+
+
+def steadied_or_lost(scan: Scan, shift: float, turn: float) -> Scan:
+    """`steadied`; a scan that proves nothing where a robot is told to move as none does: that is
+    for the executor to judge, and must not end a planner."""
+    if shift < scan.range_max and turn < math.pi:
+        return steadied(scan, shift, turn)
+    return replace(scan, ranges=np.full_like(scan.ranges, math.nan))
 
 
 class SteadyClient(ScipClient):
@@ -131,6 +145,6 @@ class SteadyClient(ScipClient):
         if state is None:
             return replace(scan, ranges=np.full_like(scan.ranges, math.nan))
         rolling, turning = bounds(float(state[3]), float(state[4]), self._track)
-        return steadied(
-            scan, half * (rolling + turning * self._arm), half * turning + self._heading_error
-        )
+        turn = half * turning + self._heading_error
+        # a heading that is off has the sensor elsewhere too, on the end of its arm
+        return steadied_or_lost(scan, half * rolling + turn * self._arm, turn)

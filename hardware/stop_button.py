@@ -7,13 +7,15 @@ python -m hardware.stop_button DIRECTORY --reset    # let it drive again, once i
 from __future__ import annotations
 
 import argparse
+import contextlib
 import os
 import select
 import sys
 import time
 from pathlib import Path
 
-from hardware.executor import BUTTON
+from hardware.executor import BUTTON, LATCH
+from hardware.executor_process import busy
 from hardware.letterbox import Letterbox
 from hardware.messages import Message, MessageError, Reset, Stop, decode
 from hardware.status import State, Status
@@ -28,7 +30,8 @@ class StopButton:
     """Presses and lets go; hears whether that was understood."""
 
     def __init__(self, directory: Path) -> None:
-        self._to = directory / BUTTON
+        self._directory = directory
+        self._to, self._latch = directory / BUTTON, directory / LATCH
         self._session = time.monotonic_ns()
         self._box = Letterbox(directory / f"button-{os.getpid()}-{self._session:x}")
         self._sent = 0
@@ -40,13 +43,21 @@ class StopButton:
         self._box.close()
 
     def press(self) -> bool:
-        """Stop for good. Whether the executor says that it does."""
+        """Stop for good. Whether the executor says that it does; where none does, the next one that
+        works here finds that it was pressed."""
         state = self._say(Stop())
+        if state is not State.EMERGENCY:
+            with contextlib.suppress(OSError):
+                self._latch.touch()
         return state is State.EMERGENCY
 
     def release(self) -> bool:
-        """Let it drive again. Whether the executor says that it may; not while it moves."""
+        """Let it drive again. Whether the executor says that it may; not while it moves. Where
+        none works, nothing drives, and the next one finds that it was let go."""
         state = self._say(Reset())
+        if state is None and not busy(self._directory):
+            self._latch.unlink(missing_ok=True)
+            return True
         return state is not None and state is not State.EMERGENCY
 
     def _say(self, body: Stop | Reset) -> State | None:
@@ -80,6 +91,13 @@ def main() -> int:
     parser.add_argument("directory", type=Path, help="of the executor's sockets")
     parser.add_argument("--reset", action="store_true", help="let it drive again")
     given = parser.parse_args()
+    if not given.directory.is_dir():
+        print(
+            f"stop_button DIRECTORY = {given.directory}: no such folder; give that of the"
+            " executor's sockets, as passpmp doctor names it",
+            file=sys.stderr,
+        )
+        return 2
     with StopButton(given.directory) as button:
         done = button.release() if given.reset else button.press()
     print(("drives again" if given.reset else "stops") if done else "the executor did not obey")

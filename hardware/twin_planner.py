@@ -32,7 +32,7 @@ from hardware.scip_client import ScipClient
 from hardware.steady import SteadyClient
 from hardware.twin_cycles import Cycle, CycleWriter
 from hardware.twin_process import TwinConfig
-from hardware.twin_settings import scip_settings, settings_of
+from hardware.twin_settings import guess_of, scip_settings, settings_of, unforeseen_of
 from hardware.twin_wrong import ORDERS, WrongLink
 from passpmp_ti import door
 from passpmp_ti.grid.static_map import StaticMap
@@ -195,21 +195,24 @@ def _navigator(config: PlannerConfig) -> Navigator:
 
 
 def _link(config: PlannerConfig, navigator: Navigator) -> PlannerLink:
-    directory, track = config.twin.directory, config.twin.nature().limits.track
+    directory, nature = config.twin.directory, config.twin.nature()
+    track, guess = nature.limits.track, guess_of(config.cycle, nature)
     if config.obeys:
-        return WrongLink(directory, track=track, orders=directory / ORDERS)
-    return PlannerLink(directory, track=track)
+        return WrongLink(directory, track=track, guess=guess, orders=directory / ORDERS)
+    return PlannerLink(directory, track=track, guess=guess)
 
 
 def _clients(
     config: PlannerConfig, navigator: Navigator, link: PlannerLink, ports: list[int]
 ) -> list[SteadyClient]:
     nature = config.twin.nature()
+    track = nature.limits.track
+    turned = 2.0 * unforeseen_of(config.cycle, nature) / track
     return [
         SteadyClient(
             scip_settings(port, lidar.range_max),
-            state_at=link.state_at, pose_at=poser(link, lidar.pose), track=nature.limits.track,
-            arm=float(np.hypot(*lidar.mount[:2])), heading_error=nature.heading_error,
+            state_at=link.state_at, pose_at=poser(link, lidar.pose), track=track,
+            arm=float(np.hypot(*lidar.mount[:2])), heading_error=nature.heading_error + turned,
         )
         for port, lidar in zip(ports, config.twin.load().lidars, strict=True)
     ]  # fmt: skip

@@ -8,7 +8,7 @@ from dataclasses import replace
 from hardware.chair_lidar import LIDAR_NOISE
 from hardware.chair_model import ChairNature
 from hardware.executor_settings import ExecutorSettings
-from hardware.margins import APART, executor_settings, with_margins
+from hardware.margins import APART, executor_settings, longest_guess, unforeseen, with_margins
 from hardware.scip_settings import ScipSettings
 from passpmp_ti.robots import DifferentialDrive
 from passpmp_ti.settings import Settings
@@ -66,6 +66,17 @@ def executor_of(cycle: float) -> ExecutorSettings:
     return executor_settings(cycle, bound=BOUND, rest_late=REST_LATE)
 
 
+def guess_of(cycle: float, nature: ChairNature) -> float:
+    """How long after the newest odometry the chair's state may be told [s]."""
+    return longest_guess(executor_of(cycle), nature.period)
+
+
+def unforeseen_of(cycle: float, nature: ChairNature) -> float:
+    """What a wheel does otherwise than it did at the newest odometry, for as long as a state is
+    told after that [m]: the order that it follows changes no faster."""
+    return unforeseen(nature.limits.acceleration, guess_of(cycle, nature))
+
+
 def settings_of(scenario: Scenario, world: World, cycle: float, nature: ChairNature) -> Settings:
     """The scenario's settings with the margins that chair, executor and lidars ask for.
 
@@ -79,7 +90,7 @@ def settings_of(scenario: Scenario, world: World, cycle: float, nature: ChairNat
         ),
         executor_of(cycle),
         cycle=cycle,
-        localisation_error=nature.localisation_error,
+        localisation_error=nature.localisation_error + unforeseen_of(cycle, nature),
         range_noise=3 * LIDAR_NOISE + LEAN,
         scan_age=scip_settings(1, RANGE).stamp_error + APART,
         top_speed=0.0,

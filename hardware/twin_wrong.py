@@ -21,16 +21,17 @@ seconds. Any other: go right."""
 class WrongLink(PlannerLink):
     """Says what is wrong, or at the wrong time."""
 
-    def __init__(self, directory: Path, *, track: float, orders: Path) -> None:
+    def __init__(self, directory: Path, *, track: float, guess: float, orders: Path) -> None:
         """
         Args:
             directory: of the executor's sockets.
             track: distance between the driven wheels [m].
+            guess: a state is told for times at most this long after the newest odometry [s].
             orders: where it is told how to go wrong.
         """
         self._nan, self._step = False, 0.0
         self._orders = Letterbox(orders)
-        super().__init__(directory, track=track, clock=self._now)
+        super().__init__(directory, track=track, guess=guess, clock=self._now)
 
     def poll(self, timeout: float = 0.0) -> Status | None:
         # whatever is wrong, every cycle asks how it goes

@@ -1,5 +1,6 @@
 """A robot's file: what it may say, what it comes to, and a drive from it with emulated devices."""
 
+import fcntl
 import importlib
 import math
 import os
@@ -7,13 +8,14 @@ import signal
 import socket
 import subprocess
 import sys
+import time
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from hardware import doctor_robot, on_robot
+from hardware import doctor_robot, on_robot, stop_button
 from hardware import driven as driven_
 from hardware.base import Odometry
 from hardware.base_kinds import KINDS
@@ -70,13 +72,31 @@ def test_what_was_measured_comes_to_margins():
     assert executor.bound == pytest.approx(1.5 * m.tracking_error)
     assert planner.tracking_error >= executor.bound + executor.reaction
     # wheels may change by twice what they brake while odometry is on its way
-    wheels = 0.5 * 2 * config.limits.acceleration * (0.01 + HALF_SWEEP) ** 2
+    # 10 ms to be measured, two of the executor's periods to be told, half of a sweep
+    assert config.guess == pytest.approx(0.03)
+    wheels = 0.5 * 2 * config.limits.acceleration * (config.guess + HALF_SWEEP) ** 2
     needed = m.localisation_error + wheels
     assert needed <= planner.localisation_error < needed + 0.01
     # each scan holds the heading's error itself
     assert config.heading_error == pytest.approx(m.heading_error + 2 * wheels / 0.54)
     assert planner.stamp_error == pytest.approx(0.03 + APART + m.rest_late)
     assert executor.follower.delay == pytest.approx(m.order_delay + 0.005)
+
+
+def test_a_heading_that_is_off_swings_the_body():
+    config = read_config(EXAMPLES / "wheelchair.yaml")
+    long = replace(config.robot, discs=((-0.9, 0.4), (0.9, 0.4)))
+    swung = replace(config, robot=long)
+    needed = config.measured.localisation_error + 0.9 * swung.heading_error
+    assert swung.planner_settings.localisation_error > needed
+
+
+@pytest.mark.parametrize("field", ["discs", "wheel_speed", "acceleration", "track"])
+def test_nothing_of_a_robots_body_and_wheels_is_taken_for_granted(field, tmp_path):
+    head, robot = CHAIR.split("lidars:", 1)[0].splitlines(), CHAIR.split("lidars:", 1)[1]
+    kept = "\n".join(one for one in head if not one.strip().startswith(f"{field}:"))
+    with pytest.raises(ValueError, match=f"robot.{field} is missing"):
+        read_config(written(tmp_path, f"{kept}\nlidars:{robot}"))
 
 
 @pytest.mark.parametrize(
@@ -283,6 +303,51 @@ def test_a_button_on_a_device_stops_the_robot(tmp_path):
             assert process.poll() is None
         ended(process, 5.0)
         os.close(hand)
+
+
+def test_a_button_outlives_the_planner_while_the_executor_carries_on(tmp_path):
+    device = tmp_path / "events"
+    os.mkfifo(device)
+    hand = os.open(device, os.O_RDWR)
+    gone = subprocess.Popen([sys.executable, "-c", ""])
+    gone.wait()
+    carries_on = os.open(tmp_path, os.O_RDONLY)
+    fcntl.flock(carries_on, fcntl.LOCK_EX)
+    process = subprocess.Popen(
+        [sys.executable, "-m", "hardware.button_device",
+         f'{{"directory": "{tmp_path}", "device": "{device}"}}', str(gone.pid)],
+        stdout=subprocess.PIPE, env={**os.environ, "PYTHONPATH": str(EXAMPLES.parents[1])},
+    )  # fmt: skip
+    assert process.stdout.readline() == b"ready\n"
+    os.write(hand, EVENT.pack(0, 0, KEY, 30, DOWN))
+    # nobody answers: the next executor is to know of it all the same
+    while not (tmp_path / LATCH).exists():
+        assert process.poll() is None
+        time.sleep(0.01)
+    os.close(carries_on)
+    assert process.wait(20.0) == 0
+    os.close(hand)
+
+
+def test_a_button_that_no_executor_hears_tells_the_next_one(tmp_path, monkeypatch):
+    monkeypatch.setattr(stop_button, "PATIENCE", 0.1)
+    with stop_button.StopButton(tmp_path) as button:
+        assert not button.press()
+        assert (tmp_path / LATCH).exists()
+        # one that works and does not answer may move still
+        works = os.open(tmp_path, os.O_RDONLY)
+        fcntl.flock(works, fcntl.LOCK_EX)
+        assert not button.release()
+        assert (tmp_path / LATCH).exists()
+        os.close(works)
+        assert button.release()
+        assert not (tmp_path / LATCH).exists()
+
+
+def test_a_button_of_no_folder_is_refused(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(sys, "argv", ["stop_button", str(tmp_path / "none")])
+    assert stop_button.main() == 2
+    assert "no such folder" in capsys.readouterr().err
 
 
 # a drive ---------------------------------------------------------------------------------------

@@ -272,6 +272,18 @@ def test_no_order_lets_a_base_go_that_was_told_to_stop(served):
     assert served.base.truth.right > 0.3
 
 
+def test_a_silence_does_not_make_a_base_forget_that_it_was_told_to_stop(served):
+    served.drive(0.5)
+    served.remote.stop()
+    served.drive(0.1)
+    served.wait(2 * LIMITS.command_timeout)
+    served.drive(1.0)
+    assert served.base.truth.right == 0.0
+    served.remote.reset()
+    served.drive(0.5)
+    assert served.base.truth.right > 0.3
+
+
 # the process -----------------------------------------------------------------------------------
 
 

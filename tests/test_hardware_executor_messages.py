@@ -258,6 +258,16 @@ def test_the_robots_state_is_told_for_the_time_of_a_scan(chain):
     assert chain.link.state_at(0.0) is None
 
 
+def test_no_state_is_guessed_for_longer_than_the_margins_hold(chain):
+    with PlannerLink(chain.directory, track=ROBOT.track, guess=0.03, clock=chain.clock) as link:
+        link.poll()
+        chain.tick()
+        link.poll()
+        newest = link.status.odometry[-1].stamp
+        assert link.state_at(newest + 0.029) is not None
+        assert link.state_at(newest + 0.031) is None
+
+
 def test_without_an_executor_nothing_is_known_and_nothing_raises(tmp_path):
     with PlannerLink(tmp_path, track=ROBOT.track) as link:
         link.beat(1.0)

@@ -10,6 +10,7 @@ import pytest
 from hardware import measure
 from hardware.base import BaseLimits
 from hardware.config_file import read_config
+from hardware.executor import LATCH
 from hardware.simulated_base import BaseNature, SimulatedBase
 
 EXAMPLES = Path(__file__).parents[1] / "hardware" / "examples"
@@ -50,6 +51,8 @@ def test_a_stop_is_as_long_as_it_is(speed):
 def test_silence_tells_the_bases_own_time_out():
     found, _ = stop(silent=True)
     assert found.delay == pytest.approx(0.3, abs=0.03)
+    # from the last order on, not from when no other came: less would be put into the file
+    assert found.delay >= 0.3
     assert found.distance == pytest.approx(0.3 + 1.0 / 2.4, abs=0.03)
     assert "command_timeout: 0.3" in measure.report(found, silent=True)
 
@@ -81,6 +84,17 @@ def test_a_way_that_is_too_short_is_refused(monkeypatch, capsys):
         monkeypatch.setattr(sys, "argv", ["measure", str(path), *options])
         assert measure.main() == 2
         assert told in capsys.readouterr().err
+
+
+def test_nothing_is_driven_while_the_emergency_stop_is_pressed(tmp_path, monkeypatch, capsys):
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+    (tmp_path / "passpmp").mkdir()
+    (tmp_path / "passpmp" / LATCH).touch()
+    told = [str(EXAMPLES / "emulated.yaml"), "--clear", "9"]
+    monkeypatch.setattr(sys, "argv", ["measure", *told])
+    monkeypatch.setattr(measure, "_measured", lambda *_, **__: pytest.fail("it drove"))
+    assert measure.main() == 2
+    assert "--reset" in capsys.readouterr().err
 
 
 def test_its_report_is_lines_of_a_robots_file():

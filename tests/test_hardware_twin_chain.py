@@ -61,7 +61,8 @@ def test_the_planner_reckons_with_what_executor_and_localisation_may_be_off_by()
             executor.check_margins(
                 settings.changed(**{less: getattr(settings, less) - 0.005}), scan_age=age
             )
-    assert settings.localisation_error >= NATURE.localisation_error
+    # a told place, and what its wheels do otherwise for 30 ms while the next one is on its way
+    assert settings.localisation_error >= NATURE.localisation_error + 0.5 * 1.6 * 0.03**2
     assert settings.range_noise > 0.03  # a lidar's errors are cut at that
 
 
@@ -394,7 +395,9 @@ def test_a_planner_told_to_go_wrong_does_until_it_is_told_otherwise(tmp_path):
         link.offer(rest)
         return [decode(data) for data, _ in here.collect()][-1]
 
-    with WrongLink(tmp_path, track=0.54, orders=tmp_path / "planner-orders") as link:
+    with WrongLink(
+        tmp_path, track=0.54, guess=0.03, orders=tmp_path / "planner-orders"
+    ) as link:
         right = offered(link)
         assert isinstance(right.body, Offer)
         rig.post(tmp_path / "planner-orders", b"nan")

@@ -135,6 +135,27 @@ def test_a_lost_beam_is_lost_to_all_that_may_have_been_it():
     assert np.flatnonzero(told.lost[10:-10]).tolist() == list(range(500 - 13, 500 - 6))
 
 
+def test_what_lost_beams_side_by_side_may_have_looked_at_from_elsewhere_is_lost():
+    ranges = np.full(BEAMS, 5.0)
+    ranges[500:520] = math.nan
+    told = steadied(Scan(ranges, FIRST, STEP, 10.0, (0.0, 0.0, 0.0), 0.0), 0.015, 0.0)
+    # a place at the body's edge, seen from 15 mm aside, is off by as much
+    away = math.ceil(math.asin(0.015 / OWN) / STEP)
+    assert told.lost[500 - away : 520 + away].all()
+    assert not told.lost[500 - away - 5]
+    assert not told.lost[520 + away + 5]
+
+
+def test_who_met_nothing_looked_no_farther_than_from_where_he_was():
+    ranges = np.full(BEAMS, math.inf)
+    told = steadied(Scan(ranges, FIRST, STEP, 10.0, (0.0, 0.0, 0.0), 0.0), 0.02, 0.0)
+    assert told.range_max == pytest.approx(9.98)
+    # what was met just within reach is met there still
+    ranges[:] = 9.99
+    told = steadied(Scan(ranges, FIRST, STEP, 10.0, (0.0, 0.0, 0.0), 0.0), 0.02, 0.0)
+    assert told.returned[100:-100].all()
+
+
 def test_a_range_gets_shorter_by_what_the_sensor_moved_and_none_longer():
     scan = Scan(np.full(BEAMS, 5.0), FIRST, STEP, 10.0, (0.0, 0.0, 0.0), 0.0)
     told = steadied(scan, 0.01, 0.0)
@@ -170,6 +191,17 @@ def test_the_faster_a_robot_goes_the_less_its_scans_prove(monkeypatch):
     assert rolls.ranges[500] <= 5.0 - 0.015 * 1.3
     assert 4.99 < stands.ranges[500] < 5.0
     assert turns.lost.sum() > stands.lost.sum()
+
+
+def test_a_heading_that_is_off_has_the_sensor_elsewhere_on_its_arm(monkeypatch):
+    stands = read_by(np.zeros(5), monkeypatch)
+    assert stands.ranges[500] <= 5.0 - 0.3 * 0.006
+
+
+@pytest.mark.parametrize("speed", [1e3, 1e200, 1.7e308])
+def test_wheels_as_fast_as_no_wheels_are_prove_nothing_and_break_nothing(speed, monkeypatch):
+    assert read_by(np.array([0.0, 0.0, 0.0, speed, -speed]), monkeypatch).lost.all()
+    assert read_by(np.array([0.0, 0.0, 0.0, speed, speed]), monkeypatch).lost.all()
 
 
 def test_a_robot_of_whose_motion_nothing_is_known_has_seen_nothing(monkeypatch):
