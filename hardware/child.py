@@ -7,13 +7,50 @@ import select
 import signal
 import subprocess
 import sys
+import tempfile
 from pathlib import Path
 
 
-def started(module: str, told: str, within: float) -> tuple[subprocess.Popen[bytes], bytes]:
+class Child(subprocess.Popen[bytes]):
+    """A module that runs as a process of its own. A Ctrl-C is not for it.
+
+    What it complains of goes to a file: a pipe that nobody reads would hold it up once full, and
+    break under it when this process is gone before it.
+    """
+
+    def __init__(self, module: str, told: str) -> None:
+        """
+        Args:
+            module: is run.
+            told: its first argument; the second is this process's number.
+        """
+        home = str(Path(__file__).parents[1])
+        paths = [home, *filter(None, [os.environ.get("PYTHONPATH")])]
+        # each complaint goes to the file's end, wherever it was read last
+        self._complaints = tempfile.TemporaryFile("a+b")  # noqa: SIM115 - as long as the process
+        super().__init__(
+            [sys.executable, "-m", module, told, str(os.getpid())],
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=self._complaints,
+            env={
+                **os.environ,
+                "PYTHONPATH": os.pathsep.join(paths),
+                "ENABLE_TAICHI_HEADER_PRINT": "0",
+            },
+            start_new_session=True,
+        )
+
+    def complaints(self) -> str:
+        """What it complained of so far."""
+        self._complaints.seek(0)
+        return self._complaints.read().decode(errors="replace")
+
+
+def started(module: str, told: str, within: float) -> tuple[Child, bytes]:
     """Start a module as a process, and wait for its first line.
 
-    A Ctrl-C is not for it. It is told this process's number, to end when that is gone.
+    It is told this process's number, to end when that is gone.
 
     Args:
         module: is run.
@@ -26,35 +63,22 @@ def started(module: str, told: str, within: float) -> tuple[subprocess.Popen[byt
     Raises:
         RuntimeError: it said nothing; tells what it complained of.
     """
-    home = str(Path(__file__).parents[1])
-    paths = [home, *filter(None, [os.environ.get("PYTHONPATH")])]
-    process = subprocess.Popen(
-        [sys.executable, "-m", module, told, str(os.getpid())],
-        stdin=subprocess.DEVNULL,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        env={
-            **os.environ,
-            "PYTHONPATH": os.pathsep.join(paths),
-            "ENABLE_TAICHI_HEADER_PRINT": "0",
-        },
-        start_new_session=True,
-    )
+    process = Child(module, told)
     assert process.stdout is not None
     ready, _, _ = select.select([process.stdout], [], [], within)
     line = process.stdout.readline() if ready else b""
     if not line.endswith(b"\n"):
         process.kill()
-        _, why = process.communicate()
-        raise RuntimeError(f"{module} did not start: {why.decode(errors='replace')}")
+        process.wait()
+        raise RuntimeError(f"{module} did not start: {process.complaints()}")
     return process, line
 
 
-def ended(process: subprocess.Popen[bytes], within: float) -> str:
+def ended(process: Child, within: float) -> str:
     """Ask a child to end, and see that it does. Returns what it complained of.
 
     Args:
-        process: its errors are piped.
+        process: from `started`.
         within: time that it has before it is killed [s].
     """
     if process.poll() is None:
@@ -62,8 +86,10 @@ def ended(process: subprocess.Popen[bytes], within: float) -> str:
         process.send_signal(signal.SIGCONT)
         process.terminate()
     try:
-        _, told = process.communicate(timeout=within)
+        process.wait(timeout=within)
     except subprocess.TimeoutExpired:
         process.kill()
-        _, told = process.communicate()
-    return told.decode(errors="replace")
+        process.wait()
+    assert process.stdout is not None
+    process.stdout.close()
+    return process.complaints()

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import subprocess
 import time
 from collections import Counter
 from collections.abc import Callable
@@ -14,7 +13,7 @@ import numpy as np
 
 from hardware.button_device import READY
 from hardware.chain import PlannerLoop, poser
-from hardware.child import ended, started
+from hardware.child import Child, ended, started
 from hardware.complaints import advice
 from hardware.config import DriveConfig
 from hardware.devices import devices
@@ -67,7 +66,7 @@ class RobotDrive:
             config.robot, config.planner_settings, goal=config.goals,
             static_map=_known(config), seed=seed,
         )  # fmt: skip
-        self._button: subprocess.Popen[bytes] | None = None
+        self._button: Child | None = None
         self._open = ExitStack()
 
     def __enter__(self) -> RobotDrive:

@@ -15,6 +15,7 @@ import os
 import sys
 import time
 from collections.abc import Generator, Iterable
+from contextlib import ExitStack
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -99,7 +100,7 @@ def carry_out(job: Job, film: Path | None = None) -> Result:
         film: where the last drive's video is to be, without its suffix; None: none is drawn.
 
     Raises:
-        RuntimeError: a process did not start, or died, in each of the tries.
+        RuntimeError: a process did not start in any of the tries, or died on the way.
     """
     e = job.experiment
     disturbed: list[dict[str, Any]] = []
@@ -108,17 +109,22 @@ def carry_out(job: Job, film: Path | None = None) -> Result:
             e.scenario, seed=job.seed, cycle=e.cycle, object_speed=e.object_speed, threads=1,
             ahead=e.ahead,
         )  # fmt: skip
-        try:
-            with chain:
-                told = chain.run(e.seconds).summary()
-        except RuntimeError:
-            # a machine on which it does not even start, or go on, is disturbed
-            disturbed.append(
-                {"twin_latest": math.inf, "collisions_moving": 0, "reached_goal": False}
-            )
-            if len(disturbed) == TRIES:
-                raise
-            continue
+        with ExitStack() as open_:
+            try:
+                open_.enter_context(chain)
+            except RuntimeError as why:
+                # a machine on which it does not even start is disturbed
+                disturbed.append(
+                    {
+                        "twin_latest": math.inf, "collisions_moving": 0, "reached_goal": False,
+                        "why": str(why),
+                    }
+                )  # fmt: skip
+                if len(disturbed) == TRIES:
+                    raise
+                continue
+            # a process that dies on the way ends the campaign: that is no disturbance
+            told = chain.run(e.seconds).summary()
         if told["interrupted"]:
             raise KeyboardInterrupt
         if told["twin_latest"] <= LATE:

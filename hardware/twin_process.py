@@ -16,7 +16,6 @@ import os
 import select
 import signal
 import struct
-import subprocess
 import sys
 import time
 from collections.abc import Callable, Sequence
@@ -30,7 +29,7 @@ from hardware.base import Odometry
 from hardware.base_link import BaseServer
 from hardware.chair_lidar import ChairLidar
 from hardware.chair_model import ChairNature
-from hardware.child import ended
+from hardware.child import ended, started
 from hardware.letterbox import Letterbox
 from hardware.mujoco_chair import MujocoChair
 from hardware.priority import put_forward
@@ -144,28 +143,8 @@ class TwinProcess:
         Raises:
             RuntimeError: it did not start; says why.
         """
-        home = str(Path(__file__).parents[1])
-        paths = [home, *filter(None, [os.environ.get("PYTHONPATH")])]
         self._truth = TruthReader(config.directory / TRUTH)
-        self.process = subprocess.Popen(
-            [sys.executable, "-m", "hardware.twin_process", config.to_json()],
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            env={
-                **os.environ,
-                "PYTHONPATH": os.pathsep.join(paths),
-                "ENABLE_TAICHI_HEADER_PRINT": "0",
-            },
-            start_new_session=True,
-        )
-        assert self.process.stdout is not None
-        ready, _, _ = select.select([self.process.stdout], [], [], within)
-        told = self.process.stdout.readline() if ready else b""
-        if not told.startswith(b"{"):
-            self.process.kill()
-            _, why = self.process.communicate()
-            raise RuntimeError(f"the twin did not start: {why.decode(errors='replace')}")
+        self.process, told = started("hardware.twin_process", config.to_json(), within)
         heard = json.loads(told)
         self.ports: list[int] = heard["ports"]
         """Of its range finders, in the scenario's order."""
@@ -186,15 +165,19 @@ class TwinProcess:
         return ended(self.process, within)
 
 
-def run(config: TwinConfig) -> None:
+def run(config: TwinConfig, parent: int) -> None:
     """Be a twin, until a signal or the death of whoever started this process ends it.
+
+    Args:
+        config: what it is.
+        parent: number of who started it.
 
     Raises:
         ValueError: the configuration makes no sense.
     """
     scenario = config.load()
     world, state, start_time = scenario.build(config.seed)
-    parent, asked = os.getppid(), []
+    asked: list[int] = []
 
     def leave(number: int, frame: FrameType | None) -> None:
         asked.append(number)
@@ -273,11 +256,13 @@ def _emulated(
 
 
 def main() -> int:
-    if len(sys.argv) != 2:
+    if len(sys.argv) not in (2, 3):
         print("example: python -m hardware.twin_process CONFIGURATION", file=sys.stderr)
         return 2
     try:
-        run(TwinConfig.from_json(sys.argv[1]))
+        # by hand it ends with the shell that it was started from
+        parent = int(sys.argv[2]) if len(sys.argv) == 3 else os.getppid()
+        run(TwinConfig.from_json(sys.argv[1]), parent)
     except ValueError as error:
         print(error, file=sys.stderr)
         return 2

@@ -282,15 +282,17 @@ def stood_in(monkeypatch, told):
             pass
 
         def __enter__(self):
+            if left[0] is None:
+                left.pop(0)
+                raise RuntimeError("the twin did not start")
             return self
 
         def __exit__(self, *_):
             pass
 
         def run(self, seconds):
-            if left[0] is None:
-                left.pop(0)
-                raise RuntimeError("the twin did not start")
+            if left[0] == "gone":
+                raise RuntimeError("the executor is gone")
             self.summary = lambda: left.pop(0)
             return self
 
@@ -324,6 +326,12 @@ def test_what_does_not_start_is_tried_again_and_counted(monkeypatch):
     assert len(twin_experiments.carry_out(Job(EXPERIMENTS[0], 0))["disturbed"]) == 1
     stood_in(monkeypatch, [None] * TRIES)
     with pytest.raises(RuntimeError, match="did not start"):
+        twin_experiments.carry_out(Job(EXPERIMENTS[0], 0))
+
+
+def test_an_executor_that_dies_on_the_way_is_no_disturbance(monkeypatch):
+    stood_in(monkeypatch, ["gone", told_by_a_drive()])
+    with pytest.raises(RuntimeError, match="the executor is gone"):
         twin_experiments.carry_out(Job(EXPERIMENTS[0], 0))
 
 
