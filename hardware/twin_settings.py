@@ -86,7 +86,8 @@ def settings_of(scenario: Scenario, world: World, cycle: float, nature: ChairNat
     slimmest = min([SLIMMEST, *world.movers.radius.tolist()])
     return with_margins(
         scenario.settings.changed(
-            cell=CELL, object_radius=slimmest, cruise_speed=scenario.robot.top_speed
+            cell=CELL, object_radius=slimmest, cruise_speed=scenario.robot.top_speed,
+            guide_margin=0.0,  # the passage is as wide as body and margins
         ),
         executor_of(cycle),
         cycle=cycle,

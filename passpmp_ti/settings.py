@@ -119,6 +119,10 @@ class Settings:
     guide_movers: bool = False
     """Whether the guide keeps away from movers where they are now, as from corners: worth it among
     people who stand about, not among fast movers that are elsewhere by then."""
+    guide_margin: float = 1.0
+    """How much of the grids' rounding the guide keeps from walls beside the clearance. 1: it leads
+    where every cell lets the robot through; 0: where the clearance does, though some cells may
+    not, and so into passages that are hardly wider than the robot and its margins."""
     distance: str = "mean"
     """"mean": the guide averaged along the plan; "final": at its last state (eq. 18)."""
     weight_distance: float = 1.0
@@ -179,6 +183,7 @@ class Settings:
                 f" {self.object_speed:g} m/s, which bounds every object; leave it out or lower it"
             )
         self._check_cones()
+        door.finite(name, "guide_margin", self.guide_margin, least=0.0, most=1.0)
         if not isinstance(self.guide_movers, bool):
             raise ValueError(
                 f"Settings.guide_movers must be true or false; got {self.guide_movers!r}"

@@ -178,3 +178,19 @@ def test_the_way_ahead_leads_around_a_wall():
     field = guide_to(goal, model, SETTINGS).field(model, goal, np.zeros(2))
     straight_on, aside = field.at(np.array([[0, 0.1, 0, 0, 0], [0, 0.1, np.pi / 2, 0, 0]]))
     assert aside < straight_on
+
+
+def test_a_passage_that_some_cells_may_close_is_led_into_only_if_asked():
+    plain = SETTINGS.changed(object_speed=0.0)
+    clearance = plain.clearance(ROBOT)
+    goal, cost = (2.5, 0.0), {}
+    for margin in (0.0, 1.0):
+        settings = plain.changed(guide_margin=margin)
+        guide = guide_to(goal, model_at((0, 0, 0), [], settings=settings), settings)
+        # from the middle to either wall: the clearance, and half of what 1 keeps beside it
+        half = clearance + 0.5 * (settings.cell + 0.5 * guide._cell)
+        gap = [exact.box(1.2, side * (half + 2.0), 0.2, 4.0, 0.0) for side in (-1, 1)]
+        model = model_at((0, 0, 0), gap, settings=settings)
+        cost[margin] = float(guide.field(model, goal, np.zeros(2)).at(np.zeros((1, 5)))[0])
+    assert cost[0.0] < 4.0
+    assert cost[1.0] > cost[0.0] + 2.0

@@ -88,7 +88,8 @@ class Guide:
         self._walls = device.full(self._shape, 1, np.uint8)
         self._blocked = device.full(self._shape, 0, np.uint8)
         # the model keeps up to a cell more from a wall than the clearance
-        self._kept = (settings.clearance(robot) + settings.cell) / self._cell + 0.5
+        rounding = settings.cell + 0.5 * self._cell
+        self._kept = (settings.clearance(robot) + settings.guide_margin * rounding) / self._cell
         self._slowness = device.empty((rows, columns), np.float32)
         self._down = device.empty((rows, columns), np.int32)
         self._numbers = device.put(self._lay_out_numbers())
