@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 from html import escape
 from types import SimpleNamespace
 
@@ -10,12 +11,14 @@ import pytest
 from scipy.stats import binom
 
 from passpmp_ti.compare import page, rows, table
+from passpmp_ti.compare.axes import legend
 from passpmp_ti.compare.findings import findings
 from passpmp_ti.compare.intervals import median_interval, share_interval
 from passpmp_ti.compare.job import key_of
 from passpmp_ti.compare.promise import Promises, moves, would_touch
 from passpmp_ti.compare.reliability import reliability
 from passpmp_ti.compare.summary import summarise
+from passpmp_ti.compare.svg import Drawing
 from passpmp_ti.robots import DifferentialDrive
 from passpmp_ti.sim.movers import NoMovers, PathMovers
 from passpmp_ti.trajectory import Trajectory
@@ -268,3 +271,13 @@ def test_a_comparison_that_has_just_begun_has_a_page():
     told["scenarios"]["s"] |= {"variants": empty["s"], "findings": findings(empty["s"])}
     assert "0: – (0.0 % to 100.0 %)" in page.html(told, {})
     json.dumps(told, allow_nan=False)
+
+
+def test_a_legend_of_more_names_than_fit_a_row_stays_in_the_drawing():
+    drawing = Drawing((560.0, 340.0), "four")
+    legend(drawing, (60.0, 332.0), ["paper kind, 40", "paper kind, 238"] * 2 + ["ours"], 560.0)
+    told = re.findall(r'<text class="tick" x="[\d.]+" y="([\d.]+)"', drawing.svg())
+    heights = [float(y) for y in told]
+    assert len(heights) == 5
+    assert max(heights) == 332.0
+    assert min(heights) == 316.0

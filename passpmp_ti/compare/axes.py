@@ -83,15 +83,19 @@ class Axes:
 
 
 def legend(drawing: Drawing, at: Point, names: Sequence[str], right: float) -> None:
-    """Marks and names of the variants in a row that begins at `at` and ends before `right`."""
-    x, y = at
-    for n, name in enumerate(names):
+    """Marks and names of the variants, in rows that begin at x and end before `right`, the last of
+    them at y."""
+    x, row, places = at[0], 0, []
+    for name in names:
         wide = 26 + 7.2 * len(name)
         if x + wide > right and x > at[0]:
-            x, y = at[0], y + 18
+            x, row = at[0], row + 1
+        places.append((x, row))
+        x += wide
+    for n, (name, (x, of)) in enumerate(zip(names, places, strict=True)):
+        y = at[1] - 16 * (row - of)
         drawing.mark((x, y - 4), n, f"mark v{n % 6}")
         drawing.words((x + 11, y), name, "tick")
-        x += wide
 
 
 def _power(n: int) -> str:
