@@ -280,4 +280,4 @@ def test_a_legend_of_more_names_than_fit_a_row_stays_in_the_drawing():
     heights = [float(y) for y in told]
     assert len(heights) == 5
     assert max(heights) == 332.0
-    assert min(heights) == 316.0
+    assert min(heights) == 317.0

@@ -93,7 +93,7 @@ def legend(drawing: Drawing, at: Point, names: Sequence[str], right: float) -> N
         places.append((x, row))
         x += wide
     for n, (name, (x, of)) in enumerate(zip(names, places, strict=True)):
-        y = at[1] - 16 * (row - of)
+        y = at[1] - 15 * (row - of)
         drawing.mark((x, y - 4), n, f"mark v{n % 6}")
         drawing.words((x + 11, y), name, "tick")
 

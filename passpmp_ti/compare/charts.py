@@ -81,7 +81,7 @@ def arrival_chart(groups: Mapping[str, Group], longest: float) -> str:
             middle = len(times) // 2
             at = axes.at(times[middle], (middle + 1) / len(seeds))
             drawing.mark(at, n, f"mark v{n % 6}", f"{name}: {times[middle]:.1f} s")
-    legend(drawing, (LEFT, HEIGHT - 8), list(groups), WIDTH)
+    legend(drawing, (LEFT, HEIGHT - 4), list(groups), WIDTH)
     return drawing.svg()
 
 
@@ -108,7 +108,7 @@ def reliability_chart(groups: Mapping[str, Group]) -> str:
                 f" = {b['share']:.2g}"
             )
             drawing.mark((x, axes.up(b["share"])), n, f"mark {kind}", tip)
-    legend(drawing, (LEFT, HEIGHT - 8), list(groups), WIDTH)
+    legend(drawing, (LEFT, HEIGHT - 4), list(groups), WIDTH)
     return drawing.svg()
 
 

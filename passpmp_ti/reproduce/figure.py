@@ -88,5 +88,5 @@ def curves(
         drawing.line([axes.at(*p) for p in points], f"curve v{n % 6}")
         for p in points:
             drawing.mark(axes.at(*p), n, f"mark v{n % 6}", f"{name}: {p[1]:.3g}")
-    legend(drawing, (LEFT, HEIGHT - 8), list(lines), WIDTH)
+    legend(drawing, (LEFT, HEIGHT - 4), list(lines), WIDTH)
     return drawing
