@@ -8,7 +8,11 @@ import signal
 import subprocess
 import sys
 import tempfile
+from collections.abc import Callable
 from pathlib import Path
+from typing import TypeVar
+
+Config = TypeVar("Config")
 
 
 class Child(subprocess.Popen[bytes]):
@@ -93,3 +97,24 @@ def ended(process: Child, within: float) -> str:
     assert process.stdout is not None
     process.stdout.close()
     return process.complaints()
+
+
+def main_of(module: str, read: Callable[[str], Config], run: Callable[[Config, int], None]) -> int:
+    """The `main` of a module that `started` starts. Returns its exit status.
+
+    Args:
+        module: its name.
+        read: the configuration, from the first argument.
+        run: is told it, and the number of the process whose end ends this one. By hand that is the
+            shell that it was started from.
+    """
+    if len(sys.argv) not in (2, 3):
+        print(f"example: python -m {module} CONFIGURATION", file=sys.stderr)
+        return 2
+    try:
+        parent = int(sys.argv[2]) if len(sys.argv) == 3 else os.getppid()
+        run(read(sys.argv[1]), parent)
+    except ValueError as error:
+        print(error, file=sys.stderr)
+        return 2
+    return 0

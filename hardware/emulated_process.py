@@ -25,7 +25,7 @@ import numpy as np
 
 from hardware.base import BaseLimits
 from hardware.base_link import BaseServer
-from hardware.child import ended, started
+from hardware.child import ended, main_of, started
 from hardware.emulated_lidar import EmulatedLidar, Track
 from hardware.priority import put_forward
 from hardware.scip_device import Device
@@ -159,16 +159,7 @@ def _maker(see: EmulatedLidar, lock: threading.Lock, rng: np.random.Generator) -
 
 
 def main() -> int:
-    if len(sys.argv) not in (2, 3):
-        print("example: python -m hardware.emulated_process CONFIGURATION", file=sys.stderr)
-        return 2
-    try:
-        parent = int(sys.argv[2]) if len(sys.argv) == 3 else os.getppid()
-        run(EmulatedConfig.from_json(sys.argv[1]), parent)
-    except ValueError as error:
-        print(error, file=sys.stderr)
-        return 2
-    return 0
+    return main_of("hardware.emulated_process", EmulatedConfig.from_json, run)
 
 
 if __name__ == "__main__":

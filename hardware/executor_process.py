@@ -27,7 +27,7 @@ from types import FrameType
 from typing import Any
 
 from hardware.base import Base
-from hardware.child import ended, started
+from hardware.child import ended, main_of, started
 from hardware.executor import Executor, Tick
 from hardware.executor_settings import ExecutorSettings
 from hardware.follower import FollowerSettings
@@ -269,17 +269,7 @@ def _writer(log: int | None) -> Callable[[Tick], None] | None:
 
 
 def main() -> int:
-    if len(sys.argv) not in (2, 3):
-        print("example: python -m hardware.executor_process CONFIGURATION", file=sys.stderr)
-        return 2
-    try:
-        # by hand it ends with the shell that it was started from
-        parent = int(sys.argv[2]) if len(sys.argv) == 3 else os.getppid()
-        run(ExecutorConfig.from_json(sys.argv[1]), parent)
-    except ValueError as error:
-        print(error, file=sys.stderr)
-        return 2
-    return 0
+    return main_of("hardware.executor_process", ExecutorConfig.from_json, run)
 
 
 if __name__ == "__main__":

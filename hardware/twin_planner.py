@@ -23,7 +23,7 @@ import numpy as np
 
 from hardware.chain import NOWHERE, PlannerLoop, Round, poser
 from hardware.chair_model import WALL_HALF
-from hardware.child import ended, started
+from hardware.child import ended, main_of, started
 from hardware.link import PlannerLink
 from hardware.margins import APART
 from hardware.merge import check_stamp_error
@@ -242,16 +242,7 @@ def _cycle(
 
 
 def main() -> int:
-    if len(sys.argv) not in (2, 3):
-        print("example: python -m hardware.twin_planner CONFIGURATION", file=sys.stderr)
-        return 2
-    try:
-        parent = int(sys.argv[2]) if len(sys.argv) == 3 else os.getppid()
-        run(PlannerConfig.from_json(sys.argv[1]), parent)
-    except ValueError as error:
-        print(error, file=sys.stderr)
-        return 2
-    return 0
+    return main_of("hardware.twin_planner", PlannerConfig.from_json, run)
 
 
 if __name__ == "__main__":

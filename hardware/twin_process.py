@@ -29,7 +29,7 @@ from hardware.base import Odometry
 from hardware.base_link import BaseServer
 from hardware.chair_lidar import ChairLidar
 from hardware.chair_model import ChairNature
-from hardware.child import ended, started
+from hardware.child import ended, main_of, started
 from hardware.letterbox import Letterbox
 from hardware.mujoco_chair import MujocoChair
 from hardware.priority import put_forward
@@ -256,17 +256,7 @@ def _emulated(
 
 
 def main() -> int:
-    if len(sys.argv) not in (2, 3):
-        print("example: python -m hardware.twin_process CONFIGURATION", file=sys.stderr)
-        return 2
-    try:
-        # by hand it ends with the shell that it was started from
-        parent = int(sys.argv[2]) if len(sys.argv) == 3 else os.getppid()
-        run(TwinConfig.from_json(sys.argv[1]), parent)
-    except ValueError as error:
-        print(error, file=sys.stderr)
-        return 2
-    return 0
+    return main_of("hardware.twin_process", TwinConfig.from_json, run)
 
 
 if __name__ == "__main__":
