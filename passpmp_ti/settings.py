@@ -136,6 +136,9 @@ class Settings:
     """The goal is reached at rest within this distance [m]."""
     cruise_speed: float | None = None
     """The guide's idea of the robot's speed in the open [m/s]; None: the robot's top speed."""
+    patience: float | None = 10.0
+    """After so long about one place short of the goal the robot backs out and tries from elsewhere
+    [s]; None: it stands for as long as nothing better is in reach. With guide="safe_time"."""
 
     def __post_init__(self) -> None:
         name = "Settings"
@@ -177,6 +180,8 @@ class Settings:
                 door.finite(name, field_, getattr(self, field_), least=0.0)
         if self.cruise_speed is not None:
             door.finite(name, "cruise_speed", self.cruise_speed, above=0.0, unit="m/s")
+        if self.patience is not None:
+            door.finite(name, "patience", self.patience, above=0.0, unit="s")
         if self.blind_speed is not None and self.blind_speed > self.object_speed:
             raise ValueError(
                 f"Settings.blind_speed = {self.blind_speed:g} m/s is above object_speed ="

@@ -131,6 +131,20 @@ def lay_out(
 
 
 @kernel
+def heap(
+    # in
+    hill: ti.types.ndarray(dtype=ti.f32, ndim=1),  # [4] column and row of the top, reach, height
+    # in / out
+    time: Field,  # [J, I]
+):
+    """Add a cone to the times: places that the robot is to leave."""
+    for j, i in time:
+        away = ti.sqrt((i + 0.5 - hill[0]) ** 2 + (j + 0.5 - hill[1]) ** 2)
+        if away < hill[2]:
+            time[j, i] += hill[3] * (1.0 - away / hill[2])
+
+
+@kernel
 def point_ahead(
     # in
     time: Field,  # [J, I]

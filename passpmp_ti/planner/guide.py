@@ -11,9 +11,10 @@ from passpmp_ti import device
 from passpmp_ti.grid.model import FutureModel
 from passpmp_ti.grid.static_map import StaticMap
 from passpmp_ti.grid.tubes import asked_speed
-from passpmp_ti.kernels.eikonal import block, lay_out, meet, point_ahead
+from passpmp_ti.kernels.eikonal import block, heap, lay_out, meet, point_ahead
 from passpmp_ti.kernels.guide import guide_costs
 from passpmp_ti.planner.eikonal import distances_to_zeros, solve
+from passpmp_ti.planner.stall import Hill
 from passpmp_ti.robots import Robot
 from passpmp_ti.settings import Settings
 
@@ -102,9 +103,14 @@ class Guide:
             block(device.put(met), self._kept, self._blocked)
 
     def field(
-        self, model: FutureModel, goal: tuple[float, float], position: np.ndarray
+        self,
+        model: FutureModel,
+        goal: tuple[float, float],
+        position: np.ndarray,
+        hill: Hill | None = None,
     ) -> GuideField:
-        """The cost to go to `goal`, given what this cycle's model shows from `position` [2]."""
+        """The cost to go to `goal`, given what this cycle's model shows from `position` [2], and
+        what is added about a place where the robot stalled."""
         frame = np.zeros(11, dtype=np.float32)
         local_goal = np.array(goal) - np.array(self.anchor)
         frame[:2] = self._low
@@ -129,6 +135,10 @@ class Guide:
             self._numbers, self._blocked, distances_to_zeros(corners), j, i, self._slowness, time
         )
         solve(self._slowness, (j, i), time)
+        if hill is not None:
+            top = (np.array(hill.place) - np.array(self.anchor) - self._low) / self._cell
+            numbers = np.array([*top, hill.reach / self._cell, hill.height], dtype=np.float32)
+            heap(device.put(numbers), time)
         here = (np.asarray(position) - np.array(self.anchor) - self._low) / self._cell
         low = np.clip(np.floor(here - AROUND), 0, None).astype(int)
         high = np.minimum(np.ceil(here + AROUND), (columns, rows)).astype(int)

@@ -30,6 +30,7 @@ from passpmp_ti.planner.plan import (
 from passpmp_ti.planner.record import CycleRecord
 from passpmp_ti.planner.rehearsal import rehearse
 from passpmp_ti.planner.risk import risk_of, safety_weight
+from passpmp_ti.planner.stall import Hill, Stall
 from passpmp_ti.planner.swarm import Swarm, best_leaf
 from passpmp_ti.planner.tree import ROOT, Tree, TreeGrower
 from passpmp_ti.planner.vanished import BELIEVED_AT_LAST, Belief
@@ -88,6 +89,7 @@ class Navigator:
         self._grower = TreeGrower(robot, settings)
         self._swarm = Swarm(robot, settings) if settings.optimizer == "pso" else None
         self._guide: Guide | None = None
+        self._stall = Stall(robot, settings)
         self._next_goal = 0
         self._reserve = Reserve()
         if settings.deadline is not None:
@@ -116,6 +118,7 @@ class Navigator:
         self.goals = _goals_of(goal)
         self._next_goal = 0
         self._guide = None
+        self._stall.forget()
 
     def update(
         self,
@@ -187,14 +190,14 @@ class Navigator:
         witness = None if lost else self.model
         if forgot:
             # where memory was, or when, is not known any more
-            self.model = self._guide = None
+            self._forget()
         model = self._model(heard, lost)
         budget.lap("model")
         if witness is not None and not len(model.broken_premises):
             rests = bool(heard.anew) or stamp >= self.held.end
             doubt = self._belief.doubt(witness, model, timeless=bool(forgot), rests=rests)
             if doubt == BELIEVED_AT_LAST:
-                self.model = self._guide = None
+                self._forget()
                 model, forgot = self._model(heard, lost), doubt
                 budget.lap("model")
             elif doubt:
@@ -298,7 +301,9 @@ class Navigator:
 
         if budget.explored():
             return self._without_tree(record, root, "the model left no time to plan")
-        guide = self._guide_field(model, state)
+        hill = self._stall.look(record.stamp, float(state[0]), float(state[1]))
+        record = replace(record, stalled=hill is not None)
+        guide = self._guide_field(model, state, hill)
         budget.lap("guide")
         if budget.explored():
             return self._without_tree(record, root, "the guide left no time to plan")
@@ -375,6 +380,7 @@ class Navigator:
             return self.reached
         if self._next_goal < len(self.goals):
             self._next_goal += 1
+            self._stall.forget()
         if self.reached:
             self._hold(Trajectory.resting(root, start))
         return self.reached
@@ -407,13 +413,20 @@ class Navigator:
         self.held = trajectory
         self._laid = False
 
-    def _guide_field(self, model: FutureModel, state: np.ndarray) -> GuideField:
+    def _forget(self) -> None:
+        """Of all that has a place in it."""
+        self.model = self._guide = None
+        self._stall.forget()
+
+    def _guide_field(
+        self, model: FutureModel, state: np.ndarray, hill: Hill | None
+    ) -> GuideField:
         if self._guide is None or self._guide.anchor != model.window.anchor:
             self._guide = Guide(
                 self.robot, self.settings, (float(state[0]), float(state[1])), self.goals,
                 model.window.anchor, model.window.inner_radius, self.static_map,
             )  # fmt: skip
-        return self._guide.field(model, self.goal, state[:2])
+        return self._guide.field(model, self.goal, state[:2], hill)
 
     def _choose(self, tree: Tree) -> tuple[int, tuple[int, ...], float]:
         """(leaf, distinct leaves of the particles, its cost); the root where nothing grew."""

@@ -103,6 +103,9 @@ class CycleRecord:
     """Distance between the robot and its plan at t_k [m]."""
     turn_deviation: float = 0.0
     """Angle between the robot's heading and its plan's at t_k [rad]."""
+    stalled: bool = False
+    """The robot stood about one place for longer than `Settings.patience`, and that place still
+    costs more: it backs out, or comes from elsewhere."""
     goal: tuple[float, float] = (0.0, 0.0)
     """The goal that this cycle drove to [m]."""
 

@@ -50,6 +50,7 @@ def rehearse(make: Callable[..., Navigator], robot: Robot, settings: Settings) -
     quick = settings.changed(
         deadline=None, exploration_time=None, capacity=min(settings.capacity, NODES), window=None,
         object_speed=min(settings.object_speed, ALMOST_STILL), blind_speed=None,
+        patience=0.5 * settings.cycle,
     )  # fmt: skip
     room = 2 * robot.radius + 2 * settings.object_radius + ACROSS * settings.cell
     navigator = make(robot, quick, (0.6 * room, 0.0))
