@@ -166,10 +166,7 @@ def poser(link: PlannerLink, of_robot: Callable[[np.ndarray], Pose]) -> Callable
     """
 
     def pose_at(when: float) -> Pose:
-        state = link.state_at(when)
-        if state is None:
-            link.poll(timeout=ASK)
-            state = link.state_at(when)
+        state = link.state_between(when)
         return NOWHERE if state is None else of_robot(state)
 
     return pose_at

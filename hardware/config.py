@@ -149,7 +149,6 @@ class DriveConfig:
             localisation_error=m.localisation_error + self._unforeseen + swung,
             range_noise=max(lidar.range_noise for lidar in self.lidars),
             scan_age=self.scan_age,
-            top_speed=0.0,
         )
 
     def base_options(self) -> dict[str, Any]:

@@ -66,7 +66,8 @@ class PlannerLink:
         Args:
             directory: of the executor's sockets.
             track: distance between the driven wheels [m].
-            guess: a state is told for times at most this long after the newest odometry [s].
+            guess: a state is told for times at most this long after the newest odometry [s], and
+                an odometry is known here no later than this after its time.
             clock: seconds that never go back, the same for all processes.
         """
         self.status: Status | None = None
@@ -176,6 +177,25 @@ class PlannerLink:
         change = np.subtract(b[1:], a[1:])
         change[2] = math.remainder(change[2], math.tau)
         return np.array(a[1:]) + share * change
+
+    def state_between(self, time: float) -> np.ndarray | None:
+        """As `state_at`, of a time that is over, without a guess: wheels slip, and what they tell
+        of the way since the newest odometry may be wrong by more than any margin holds.
+
+        Waits for the odometry after that time for as long as one is on its way at the most.
+
+        Returns:
+            [5]; None where none came from after it, or nothing is known from before.
+        """
+        while not self._known_until(time):
+            left = time + self._guess - self._clock()
+            self.poll(timeout=max(left, 0.0))
+            if left <= 0.0:
+                break
+        return self.state_at(time) if self._known_until(time) else None
+
+    def _known_until(self, time: float) -> bool:
+        return bool(self._odometry) and self._odometry[-1].stamp >= time
 
     def close(self) -> None:
         """Nothing is sent or heard any more."""

@@ -29,7 +29,6 @@ def with_margins(
     localisation_error: float,
     range_noise: float,
     scan_age: float,
-    top_speed: float,
 ) -> Settings:
     """A planner's settings with the margins that the rest of the chain asks for.
 
@@ -39,10 +38,10 @@ def with_margins(
         settings: for the rest.
         executor: follows what is planned.
         cycle: of the planner [s].
-        localisation_error: greatest error of a told pose [m].
+        localisation_error: greatest error of a told pose, and of what a robot rolls in a sweep
+            unless that is in its scans (`steady.py`) [m].
         range_noise: greatest error of a range [m].
         scan_age: how much older than its stamp a beam may be [s].
-        top_speed: of the robot [m/s].
 
     Raises:
         ValueError: a cycle that leaves no time to plan, or settings that make no sense.
@@ -52,7 +51,7 @@ def with_margins(
         cycle=cycle,
         deadline=cycle - HASTE,
         tracking_error=_up(executor.bound + executor.reaction),
-        localisation_error=_up(localisation_error + HALF_SWEEP * top_speed),
+        localisation_error=_up(localisation_error),
         range_noise=range_noise,
         stamp_error=scan_age + executor.rest_late,
     )

@@ -234,12 +234,9 @@ class Planner:
         if mount is None:
             self._count(f"no upright {sweep.frame} on {self.settings.base_frame} in tf")
             return None
-        state = link.state_at(middle)
+        state = link.state_between(middle)
         if state is None:
-            link.poll(timeout=0.005)
-            state = link.state_at(middle)
-        if state is None:
-            self._count("no odometry of a scan's time")
+            self._count("no odometry from after a scan's time")
             return None
         x, y, theta = (float(v) for v in state[:3])
         try:

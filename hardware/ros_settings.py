@@ -244,7 +244,6 @@ class RosSettings:
             + self._unforeseen,
             range_noise=self.range_error,
             scan_age=self.scan_age,
-            top_speed=0.0,  # what it rolls in a sweep is in already
         )
         made = needed.changed(**self.settings)
         for name in ("localisation_error", "range_noise"):

@@ -94,5 +94,4 @@ def settings_of(scenario: Scenario, world: World, cycle: float, nature: ChairNat
         localisation_error=nature.localisation_error + unforeseen_of(cycle, nature),
         range_noise=3 * LIDAR_NOISE + LEAN,
         scan_age=scip_settings(1, RANGE).stamp_error + APART,
-        top_speed=0.0,
     )

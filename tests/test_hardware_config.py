@@ -120,14 +120,14 @@ def test_margins_are_rounded_to_more_and_never_to_less():
     for error in np.linspace(0.0, 0.05, 41):
         told = with_margins(
             Settings.for_robot(robot), executor, cycle=0.2, localisation_error=float(error),
-            range_noise=0.04, scan_age=0.03, top_speed=1.0,
+            range_noise=0.04, scan_age=0.03,
         )  # fmt: skip
-        assert told.localisation_error >= error + HALF_SWEEP - 1e-9
-        assert told.localisation_error < error + HALF_SWEEP + 0.01
+        assert told.localisation_error >= error - 1e-9
+        assert told.localisation_error < error + 0.01
     with pytest.raises(ValueError, match="cycle"):
         with_margins(
             Settings.for_robot(robot), executor, cycle=0.02, localisation_error=0.0,
-            range_noise=0.0, scan_age=0.03, top_speed=1.0,
+            range_noise=0.0, scan_age=0.03,
         )  # fmt: skip
 
 

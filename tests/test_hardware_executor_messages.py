@@ -268,6 +268,22 @@ def test_no_state_is_guessed_for_longer_than_the_margins_hold(chain):
         assert link.state_at(newest + 0.031) is None
 
 
+def test_a_sensors_place_is_told_from_odometry_before_and_after_and_never_guessed(chain):
+    with PlannerLink(chain.directory, track=ROBOT.track, guess=0.03, clock=chain.clock) as link:
+        link.poll()
+        chain.tick()
+        link.poll()
+        newest = link.status.odometry[-1].stamp
+        assert link.state_at(newest + 0.001) is not None
+        assert np.array_equal(link.state_between(newest - 0.004), link.state_at(newest - 0.004))
+        chain.now = newest + 0.031  # nothing is on its way any more
+        assert link.state_between(newest + 0.001) is None
+        chain.tick()
+        assert link.state_between(newest + 0.001) is not None
+    with PlannerLink(chain.directory, track=ROBOT.track, clock=chain.clock) as deaf:
+        assert deaf.state_between(0.0) is None
+
+
 def test_without_an_executor_nothing_is_known_and_nothing_raises(tmp_path):
     with PlannerLink(tmp_path, track=ROBOT.track) as link:
         link.beat(1.0)

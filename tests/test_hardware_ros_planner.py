@@ -65,6 +65,8 @@ class Link:
     def state_at(self, when):
         return self.state.copy()
 
+    state_between = state_at
+
     def beat(self, stamp):
         self.beats.append(stamp)
 
