@@ -61,14 +61,15 @@ EXPERIMENTS = (
     Experiment(
         figure=21, scenario="corridor_person", cycle=0.1, object_speed=0.5, seconds=75, ahead=5
     ),
-    Experiment(figure=22, scenario="dead_end", cycle=0.1, object_speed=0.5, seconds=30),
-    Experiment(figure=19, scenario="narrow_passage", cycle=0.4, object_speed=0.15, seconds=60),
+    # over before a chair that came to rest there backs out, see `Settings.patience`
+    Experiment(figure=22, scenario="dead_end", cycle=0.1, object_speed=0.5, seconds=24),
+    Experiment(figure=19, scenario="narrow_passage", cycle=0.4, object_speed=0.1, seconds=60),
     Experiment(figure=20, scenario="corridor", cycle=0.4, object_speed=0.2, seconds=60),
     # slowed down to that, he stands there for 80 s: the chair comes when most of it is over
     Experiment(
         figure=21, scenario="corridor_person", cycle=0.4, object_speed=0.2, seconds=75, ahead=85
     ),
-    Experiment(figure=22, scenario="dead_end", cycle=0.4, object_speed=0.2, seconds=30),
+    Experiment(figure=22, scenario="dead_end", cycle=0.4, object_speed=0.2, seconds=24),
 )
 
 

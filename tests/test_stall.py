@@ -9,7 +9,7 @@ from oracle import exact
 from passpmp_ti import DifferentialDrive, Settings
 from passpmp_ti.grid.model import FutureModel
 from passpmp_ti.planner.guide import Guide
-from passpmp_ti.planner.stall import REACH, Hill, Stall
+from passpmp_ti.planner.stall import REACH, SINK, Hill, Stall
 from passpmp_ti.sim.episode import simulate
 from passpmp_ti.sim.lidar import Lidar
 from passpmp_ti.sim.scenario import Scenario
@@ -63,20 +63,20 @@ def test_a_hill_that_was_left_sinks_until_it_is_gone():
     stall = watching()
     full = stand(stall, 0.0, 3.0)
     away = 2 * NEAR
-    half = stall.look(3.0 + 0.5 * PATIENCE, away, 0.0)
+    half = stall.look(3.0 + 0.5 * SINK * PATIENCE, away, 0.0)
     assert half.place == full.place
     assert half.height == pytest.approx(0.5 * full.height)
-    assert stall.look(3.0 + PATIENCE, 2 * away, 0.0) is None
+    assert stall.look(3.0 + SINK * PATIENCE, 2 * away, 0.0) is None
 
 
 def test_where_it_stalls_again_the_hill_sinks_more_slowly():
     def left(first, second):
-        """What is left of the second hill a patience and a half after it was left."""
+        """What is left of the second hill later than a first one lasts."""
         stall = watching()
         stand(stall, 0.0, 3.0, first)
         stall.look(3.1, *(np.array(first) + 2 * FAR))
         stand(stall, 10.0, 13.0, second)
-        return stall.look(13.0 + 1.5 * PATIENCE, *(np.array(second) + 2 * FAR))
+        return stall.look(13.0 + 1.5 * SINK * PATIENCE, *(np.array(second) + 2 * FAR))
 
     assert left((0.0, 0.0), (5 * FAR, 0.0)) is None
     assert left((0.0, 0.0), (0.5 * NEAR, 0.0)) is not None

@@ -19,6 +19,9 @@ from passpmp_ti.settings import Settings
 REACH = 5.0
 """How far about a stall's place it costs more, in radii of the robot's body: far enough to look
 round what it stood beside."""
+SINK = 0.5
+"""A hill that was left is gone after this share of the patience, and as much more for each time that
+the robot stalled there."""
 RISE = 4.0
 """Each second of standing more, the flank of a hill is steeper by this many times what a way costs
 in the open; beside corners ways cost up to `1 / guide.SLOWEST_SHARE` times as much."""
@@ -90,7 +93,7 @@ class Stall:
     def _sunk(self, stamp: float) -> Hill | None:
         if self._hill is None or self._patience is None:
             return None
-        gone = (stamp - self._left) / (self._patience * self._times)
+        gone = (stamp - self._left) / (SINK * self._patience * self._times)
         if gone >= 1.0:
             return None
         return Hill(self._hill.place, self._hill.reach, (1.0 - gone) * self._hill.height)
