@@ -37,7 +37,8 @@ EXPERIMENTS_HEAD = """## The paper's four experiments
 begins, and all noise. Contacts are the truth's: *moving* if the chair moved at any moment of it.
 *Stood*: the longest time at rest on the way, least and greatest of the drives. In
 `corridor_person` the way is blocked until the person leaves; `dead_end` has no way to its goal,
-and is over when its time is: there the column tells how many stood at rest then.
+and is over when its time is, before the chair backs out of it: there the column tells how many
+stood at rest then.
 """
 LATENCIES_HEAD = """### Times in the chain
 

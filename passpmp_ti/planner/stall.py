@@ -20,8 +20,8 @@ REACH = 5.0
 """How far about a stall's place it costs more, in radii of the robot's body: far enough to look
 round what it stood beside."""
 SINK = 0.5
-"""A hill that was left is gone after this share of the patience, and as much more for each time that
-the robot stalled there."""
+"""A hill that was left is gone after this share of the patience, and as much more for each time
+that the robot stalled there."""
 RISE = 4.0
 """Each second of standing more, the flank of a hill is steeper by this many times what a way costs
 in the open; beside corners ways cost up to `1 / guide.SLOWEST_SHARE` times as much."""
