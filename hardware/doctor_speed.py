@@ -78,9 +78,11 @@ def jitter(steps: np.ndarray, settings: ExecutorSettings) -> Finding:
     """How late ticks are.
 
     Args:
-        steps: from each tick to the next [s].
+        steps: from each tick to the next [s]; none: there were none.
         settings: of the executor.
     """
+    if not len(steps):
+        return Finding("executor", FAIL, "it did not tick", "end what else runs, and try again")
     late = steps - settings.period
     share = float(np.quantile(late, 0.99))
     room = settings.feedback_timeout - settings.period

@@ -33,6 +33,8 @@ TICK = 0.01
 """From one order to the next [s]."""
 STEADY = 1.0
 """At the speed that it is stopped from [s]."""
+LOST = 0.5
+"""Without odometry for so long it is not driven on [s]."""
 AT_REST = 0.02
 """Wheels that turn no faster stand [m/s]."""
 RESTS = 0.5
@@ -94,7 +96,7 @@ def drive_and_stop(
         All odometry, and when it was told [s].
 
     Raises:
-        ValueError: no odometry came, or it did not come to rest.
+        ValueError: no odometry came, before it drove or while it did, or it did not come to rest.
     """
     known: list[Odometry] = []
 
@@ -104,15 +106,24 @@ def drive_and_stop(
             known.append(here)
 
     base.reset()
-    began = said = clock()
+    began = clock()
+    while not known:
+        base.drive(0.0, 0.0)
+        look()
+        sleep(TICK)
+        if clock() - began > STEADY:
+            raise ValueError("measure: no odometry comes; is what serves the base running?")
+    began = said = heard = clock()
     while (since := clock() - began) < speed / acceleration + STEADY:
         wanted = min(acceleration * since, speed)
         said = clock()
         base.drive(wanted, wanted)
+        before = known[-1]
         look()
+        heard = said if known[-1] is not before else heard
         sleep(TICK)
-        if not known and since > STEADY:
-            raise ValueError("measure: no odometry comes; is what serves the base running?")
+        if clock() - heard > LOST:
+            raise ValueError("measure: odometry ended while it drove; it is stopped")
     # a silence begins with the last thing that was said
     told = said if silent else clock()
     while not _rests(known, told):

@@ -251,6 +251,10 @@ def test_ticks_that_are_late_are_told(late, level):
     assert doctor_speed.jitter(steps, settings).level == level
 
 
+def test_an_executor_that_did_not_tick_has_failed():
+    assert doctor_speed.jitter(np.zeros(0), ExecutorSettings()).level == FAIL
+
+
 class Planner:
     """Takes a cycle's time by a clock of its own, and stands."""
 

@@ -72,6 +72,28 @@ def test_what_does_not_drive_is_no_measurement(monkeypatch):
         stop()
 
 
+def test_nothing_is_driven_before_odometry_comes_nor_long_after_it_ended(monkeypatch):
+    orders, real = [], SimulatedBase.odometry
+    drive = SimulatedBase.drive
+
+    def told(base, right, left):
+        orders.append((base._clock(), max(abs(right), abs(left))))
+        drive(base, right, left)
+
+    def heard(first, last):
+        return lambda base: real(base) if first <= base._clock() <= last else None
+
+    monkeypatch.setattr(SimulatedBase, "drive", told)
+    monkeypatch.setattr(SimulatedBase, "odometry", heard(50.5, math.inf))
+    stop()
+    assert not any(wheel for when, wheel in orders if when < 50.5)
+    orders.clear()
+    monkeypatch.setattr(SimulatedBase, "odometry", heard(50.0, 50.6))
+    with pytest.raises(ValueError, match="odometry ended"):
+        stop()
+    assert orders[-1][0] < 50.6 + measure.LOST + 0.05
+
+
 def test_a_way_that_is_too_short_is_refused(monkeypatch, capsys):
     path = EXAMPLES / "emulated.yaml"
     needed = measure.way(read_config(path), 1.0)
