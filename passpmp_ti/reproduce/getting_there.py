@@ -7,24 +7,31 @@ from typing import Any
 
 from passpmp_ti.reproduce.crowds import row_of
 from passpmp_ti.reproduce.item import Asked, Claim, Found, Numbers, table
-from passpmp_ti.reproduce.runs import PATIENCE, Run
+from passpmp_ti.reproduce.runs import Run
 from passpmp_ti.reproduce.traps import LONGEST
 from passpmp_ti.sim.scenario import load_scenario, shipped
+from passpmp_ti.sim.sources import NobodyMoves
 
 GUIDES = ("safe_time", "euclidean")
 NEVER = ("dead_end",)
 """Scenarios whose goal cannot be reached."""
 TRAP = "u_shape"
+STAYS = 15.0
+"""Where nobody moves, a robot that stood for so long is taken to stay [s]: longer than
+`Settings.patience`, after which it backs out."""
 TREES = ((40, (0.5, 1.0, 1.5)), (1200, (0.5, 1.0, 1.5)), (20_000, (0.4, 0.6, 0.8, 1.2)))
 """(capacity, primitives [s])."""
 
 
-def _drive(asked: Asked, name: str, seed: int, settings: dict[str, Any]) -> Run:
+def _drive(
+    asked: Asked, name: str, seed: int, settings: dict[str, Any], patience: float | None = None
+) -> Run:
     """One drive; the U is given less time than its scenario gives it."""
     longest = LONGEST if name == TRAP else math.inf
     return asked.runs.drive(
-        name, seed=seed, settings=settings or None, duration=min(longest, asked.longest)
-    )
+        name, seed=seed, settings=settings or None, duration=min(longest, asked.longest),
+        patience=patience,
+    )  # fmt: skip
 
 
 def run_guides(asked: Asked) -> Found:
@@ -33,16 +40,17 @@ def run_guides(asked: Asked) -> Found:
     missing: dict[str, str] = {}
     for name in shipped():
         try:
-            load_scenario(name)
+            scenario = load_scenario(name)
         except (ValueError, OSError):
             missing[name] = "the recording is not at hand"
             continue
+        still = STAYS if isinstance(scenario.movers, NobodyMoves) else None
         for guide in GUIDES:
             runs = []
             for seed in range(asked.seeds):
                 asked.see(f"guide: {name}, {guide}, seed {seed}")
                 changes = {} if guide == GUIDES[0] else {"guide": guide}
-                runs.append(_drive(asked, name, seed, changes))
+                runs.append(_drive(asked, name, seed, changes, still))
             rows.append({"scenario": name, "guide": guide, **row_of(name, runs)})
     goals = {
         guide: sum(r["reached"] for r in rows if r["guide"] == guide and r["scenario"] not in NEVER)
@@ -90,8 +98,8 @@ def tell_guides(numbers: Numbers) -> str:
             table(head, rows),
             "The default planner, and the same with `guide=\"euclidean\"` alone changed: tree,"
             " swarm and the average along the plan are the same. Where nobody moves, a robot that"
-            f" stood for {PATIENCE:g} s is taken to stay; `{TRAP}` is driven for {LONGEST:g} s at"
-            " most. The goal of `dead_end` cannot be reached. Times are medians of the drives that"
+            f" stood for {STAYS:g} s is taken to stay: with the guide it backs out after 10 s, see"
+            f" `Settings.patience`. `{TRAP}` is driven for {LONGEST:g} s at most. The goal of `dead_end` cannot be reached. Times are medians of the drives that"
             " got there.",
         ]
     )  # fmt: skip
