@@ -99,8 +99,8 @@ def tell_guides(numbers: Numbers) -> str:
             "The default planner, and the same with `guide=\"euclidean\"` alone changed: tree,"
             " swarm and the average along the plan are the same. Where nobody moves, a robot that"
             f" stood for {STAYS:g} s is taken to stay: with the guide it backs out after 10 s, see"
-            f" `Settings.patience`. `{TRAP}` is driven for {LONGEST:g} s at most. The goal of `dead_end` cannot be reached. Times are medians of the drives that"
-            " got there.",
+            f" `Settings.patience`. `{TRAP}` is driven for {LONGEST:g} s at most. The goal of"
+            " `dead_end` cannot be reached. Times are medians of the drives that got there.",
         ]
     )  # fmt: skip
 
