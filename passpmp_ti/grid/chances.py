@@ -15,8 +15,8 @@ from passpmp_ti.grid.reach import Reach
 from passpmp_ti.grid.reused import Reused
 from passpmp_ti.grid.window import Window
 from passpmp_ti.kernels.chances import CHANNELS, MOST_POINTS, SCRATCH, rasterise_windows
+from passpmp_ti.kernels.forecasts import LEFT_OUT
 from passpmp_ti.kernels.hazard import KINDS, lay_hazard
-from passpmp_ti.kernels.moments import LEFT_OUT
 from passpmp_ti.kernels.touched import layer_chances
 from passpmp_ti.robots import Robot
 from passpmp_ti.settings import Settings, integration_margin

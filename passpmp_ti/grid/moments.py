@@ -12,16 +12,9 @@ import numpy as np
 
 from passpmp_ti import device
 from passpmp_ti.grid.reach import Reach
-from passpmp_ti.kernels.moments import (
-    GRID,
-    KNOWN,
-    MOMENT,
-    MOST_PARTS,
-    ROW,
-    SMALLEST,
-    choose_moments,
-    lay_moments,
-)
+from passpmp_ti.kernels.cuts import MOST_PARTS, choose_moments
+from passpmp_ti.kernels.forecasts import SMALLEST
+from passpmp_ti.kernels.moments import GRID, KNOWN, MOMENT, ROW, lay_moments
 
 
 class Forecast(Protocol):

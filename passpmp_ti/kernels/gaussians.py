@@ -1,14 +1,14 @@
 """Gaussians of places and velocities: their shapes, what lies between two of them, and how bent.
 
-All in double precision: what one covariance adds to another is far smaller than they are. A constant
-that single precision does not hold is to be written `ti.f64(...)`.
+All in double precision: what is left of the difference of two covariances decides. A constant that
+single precision does not hold is to be written `ti.f64(...)`.
 
 A *covariance* is its ten numbers: 0-2 the places' (xx, yy, xy) [m^2], 3-6 those of velocities with
 places (vx x, vx y, vy x, vy y) [m^2/s], 7-9 the velocities' (xx, yy, xy) [m^2/s^2].
 
-A *shape* is that of the places, blurred by noise where they are too sharp: 0-2 its covariance, noise
-included (xx, yy, xy) [m^2], 3, 4 cosine and sine of the principal axis of the greater deviation,
-5, 6 the greater and the lesser standard deviation [m], 7 that of the noise [m].
+A *shape* is that of the places, blurred by noise where they are too sharp: 0-2 its covariance,
+noise included (xx, yy, xy) [m^2], 3, 4 cosine and sine of the principal axis of the greater
+deviation, 5, 6 the greater and the lesser standard deviation [m], 7 that of the noise [m].
 
 docs/risk.md derives the bounds.
 """

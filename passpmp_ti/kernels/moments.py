@@ -1,16 +1,14 @@
-"""The moments at which a forecast is rasterised, and the Gaussians of objects then.
+"""The Gaussians of a forecast's objects at the moments at which it is rasterised.
 
-Of N objects with C components a forecast of L layers is cut into J moments. All is worked out in
-double precision (kernels/gaussians.py); rows, discs and boxes are rounded to single precision last.
+All is worked out in double precision; rows, discs and boxes are rounded to single precision last.
 
-Shared parameters:
-    mean f64 [N, C, L, 4] and covariance f64 [N, C, L, 4, 4] of (x, y, vx, vy) [m, m/s]
-    weight f64 [N, C] of the components
-    radius f64 [N] within which an object touches a disc [m]
-    robot f64 [6]: 0, 1 where it is at the scan [m], 2 greatest speed of its discs [m/s],
-        3, 4 from where places count [m], 5 length of the forecast's layers [s]
-    moments f64 [J, 6]: 0 layer, 1 share of the stretch after it, 2 time [s], 3 how far the robot
-        may be until the next moment [m], 4 side of a cell of the layer of hazard [m], 5 unused
+Shared parameters, beside those of kernels/forecasts.py:
+    moments f64 [J, 5]: 0 layer, 1 share of the stretch after it, 2 time [s], 3 how far the robot
+        may be until the next moment [m], 4 side of a cell of the layer of hazard [m]
+    known f64 [J * N * C, 24], moments first: 0 mean, 4 covariance, 14 shape (kernels/gaussians.py),
+        22 bend until the next moment, 23 at first how far about its mean the object is looked up,
+        then the deviation that its bend asks for, at last how far about its mean windows reach [m]
+    wanted u8 [J * N * C]: the robot may meet it
 
 docs/risk.md derives the bounds.
 """
@@ -19,6 +17,22 @@ import math
 
 import taichi as ti
 
+from passpmp_ti.kernels.forecasts import (
+    BLUR,
+    COARSEST,
+    MOST_SIDE,
+    SHARPEST,
+    Counts,
+    Covariances,
+    Means,
+    Numbers,
+    Table,
+    covariance_at,
+    farness,
+    is_met,
+    mean_at,
+    width,
+)
 from passpmp_ti.kernels.gaussians import (
     GREAT,
     LEAST,
@@ -34,208 +48,29 @@ from passpmp_ti.kernels.gaussians import (
 )
 from passpmp_ti.kernels.launch import kernel
 
-SHARPEST = 16.0
-"""Greatest ratio of a disc's radius to a standard deviation that windows are made for."""
-BLUR = 2.0
-"""Sharper ones are blurred by noise; what is farther out in it than this [its standard deviations]
-is made up for by a factor."""
-MADE_UP = 1 / (1 - math.exp(-0.5 * BLUR * BLUR))
-"""That factor."""
-LEFT_OUT = 2e-5
-"""What an object that is not looked up may add to the risk [1/s]."""
-SMALLEST = 1e-6
-"""Components of less weight than this are not looked up: their weight is risk."""
-BEND = 0.7
-"""Greatest half length of a part times the root of how strongly a density is bent along time, that
-stretches between layers are cut into parts for."""
-STRAIGHT = 0.1
-"""Greatest way of a mean off the middle of those before and after, for the layer to be left out
-[standard deviations]."""
-MOST_PARTS = 8
-"""That a stretch is cut into."""
 STEEPEST = 1.0
 """Bend from which on Gaussians are blurred."""
 TWICE_ROOT = 2 * math.sqrt(2)
-ROUNDING = 1e-3
-"""[m] of places in single precision."""
 STRONGEST = 1.3
 """Bend that a margin can make up for."""
 LOST = 1e3
 """Margin where they are bent more than any bound allows for: the risk is 1."""
+MADE_UP = 1 / (1 - math.exp(-0.5 * BLUR * BLUR))
+"""That factor."""
 NODE = 0.8
 """Side of a cell of the layers [standard deviations of the sharper objects]."""
-COARSEST = 1.2
-"""The same of the sharpest object; what is sharper is blurred."""
-MOST_SIDE = 28
-"""Nodes along a side of a layer."""
 SHARPER = 10
 """One object of so many is sharper than the sharper objects are."""
-KNOWN, ROW, GRID = 24, 22, 9
-"""Numbers of an object's component at a moment in `known`, in `rows`, of a layer in `grids`."""
-MOMENT = 5
+ROUNDING = 1e-3
+"""[m] of places in single precision."""
+MOMENT, KNOWN, ROW, GRID = 5, 24, 22, 9
+"""Numbers of a moment, of an object's component then in `known` and in `rows`, of one in `grids`."""
+SHAPE, BENT, WIDE = 14, 22, 23
+"""Where in `known`."""
 
-Numbers = ti.types.ndarray(dtype=ti.f64, ndim=1)
-Table = ti.types.ndarray(dtype=ti.f64, ndim=2)
-Means = ti.types.ndarray(dtype=ti.f64, ndim=4)
-Covariances = ti.types.ndarray(dtype=ti.f64, ndim=5)
 Singles = ti.types.ndarray(dtype=ti.f32, ndim=2)
 Links = ti.types.ndarray(dtype=ti.i32, ndim=2)
-Counts = ti.types.ndarray(dtype=ti.i32, ndim=1)
 Flags = ti.types.ndarray(dtype=ti.u8, ndim=1)
-SHAPE, BENT, WIDE = 14, 22, 23
-
-
-@ti.func
-def mean_at(mean: ti.template(), n, c, k):
-    """[4] of a layer."""
-    return vec4(mean[n, c, k, 0], mean[n, c, k, 1], mean[n, c, k, 2], mean[n, c, k, 3])
-
-
-@ti.func
-def covariance_at(p: ti.template(), n, c, k):
-    """[10] of a layer."""
-    return vec10(
-        p[n, c, k, 0, 0], p[n, c, k, 1, 1], p[n, c, k, 0, 1],
-        p[n, c, k, 2, 0], p[n, c, k, 2, 1], p[n, c, k, 3, 0], p[n, c, k, 3, 1],
-        p[n, c, k, 2, 2], p[n, c, k, 3, 3], p[n, c, k, 2, 3],
-    )  # fmt: skip
-
-
-@ti.func
-def farness(mean, covariance, shape, radius, disc_speed):
-    """Standard deviations beyond which an object may be left out."""
-    # how fast it may come, as the root of the mean square
-    speed = ti.sqrt(mean[2] * mean[2] + mean[3] * mean[3]) + disc_speed
-    speed += 8 * ti.sqrt(covariance[7] + covariance[8])
-    rate = (radius + BLUR * shape[NOISE]) * speed / (shape[GREAT] * shape[LEAST])
-    return ti.sqrt(2 * ti.log(ti.max(rate / ti.f64(LEFT_OUT), ti.f64(math.e))))
-
-
-@ti.func
-def width(mean, covariance, least, radius, disc_speed):
-    """How far about its mean an object whose lesser deviation is `least` is looked up, with room
-    for what blurring adds [m]."""
-    sharp = shape_of(covariance, ti.max(least, radius / SHARPEST))
-    far = farness(mean, covariance, sharp, radius, disc_speed)
-    return (1 + BLUR / SHARPEST) * radius + far * sharp[GREAT]
-
-
-@ti.func
-def is_met(mean, wide, way, weight, robot: ti.template()):
-    """Whether the robot, which may be so far `way`, may meet an object that is so `wide`."""
-    x, y = mean[0] - robot[0], mean[1] - robot[1]
-    return ti.sqrt(x * x + y * y) - wide <= way and weight >= ti.f64(SMALLEST)
-
-
-@ti.func
-def are_straight(mean: ti.template(), least: ti.template(), tally: ti.template(), begin, end):
-    """Whether means between two layers lie evenly on the way from the one to the other."""
-    straight = True
-    components = tally[1]
-    for i in range(tally[0] * components):
-        n, c = i // components, i % components
-        x, y = mean[n, c, begin, 0], mean[n, c, begin, 1]
-        dx, dy = mean[n, c, end, 0] - x, mean[n, c, end, 1] - y
-        for k in range(begin + 1, end):
-            share = ti.cast(k - begin, ti.f64) / (end - begin)
-            ox = mean[n, c, k, 0] - (x + share * dx)
-            oy = mean[n, c, k, 1] - (y + share * dy)
-            if not ti.sqrt(ox * ox + oy * oy) / least[i, k] < ti.f64(STRAIGHT):
-                straight = False
-        if not straight:
-            break
-    return straight
-
-
-@kernel
-def choose_moments(
-    # in
-    mean: Means,
-    covariance: Covariances,
-    weight: Table,
-    radius: Numbers,
-    robot: Numbers,
-    layers: Table,  # [L, 2]: 0 time [s], 1 how far the robot may be then [m]
-    tally: Counts,  # [2]: 0 objects N, 1 components C
-    # scratch
-    least: Table,  # [N * C, L] lesser deviations, where what the nodes blur anyway is blurred [m]
-    bends: Table,  # [N * C, L - 1] until the next layer, 0 where nobody meets the object
-    steepest: Numbers,  # [L] their greatest
-    # out
-    moments: Table,
-    starts: Counts,  # [L]: the last moment that is no later than each layer
-) -> ti.i32:  # J
-    last = layers.shape[0] - 1
-    length = robot[5]
-    ti.loop_config(parallelize=1)  # they are few, here and below: a second thread would not pay
-    for i in range(tally[0] * tally[1]):
-        n, c = i // tally[1], i % tally[1]
-        before, shape_before = vec4(0.0), vec8(0.0)
-        spread_before = vec10(0.0)
-        met_before = False
-        for k in range(last + 1):
-            m, p = mean_at(mean, n, c, k), covariance_at(covariance, n, c, k)
-            # what the nodes of a layer that wide will blur anyway needs no moments of its own
-            coarse = 2 * layers[k, 1] / (MOST_SIDE - 2) / ti.f64(COARSEST)
-            shape = shape_of(p, ti.max(radius[n] / SHARPEST, coarse))
-            wide = width(m, p, shape[LEAST], radius[n], robot[2])
-            met = is_met(m, wide, layers[ti.min(k + 1, last), 1], weight[n, c], robot)
-            least[i, k] = shape[LEAST]
-            if k > 0:
-                bend = ti.f64(0.0)
-                if met or met_before:
-                    dx, dy = m[0] - before[0], m[1] - before[1]
-                    bend = bend_of(shape_before, shape, spread_before, p, dx, dy, length)
-                bends[i, k - 1] = bend
-            before, shape_before, spread_before, met_before = m, shape, p, met
-    ti.loop_config(parallelize=1)
-    for k in range(last):
-        most = ti.f64(0.0)
-        for i in range(tally[0] * tally[1]):
-            most = ti.max(most, bends[i, k])
-        steepest[k] = most
-    count = 0
-    begin = 0
-    while begin <= last:
-        parts = 1
-        end = begin + 1
-        if begin < last:
-            cut = ti.ceil(steepest[begin] / ti.f64(BEND))
-            parts = ti.cast(ti.min(ti.max(cut, 1.0), MOST_PARTS), ti.i32)
-            end = straight_until(mean, least, steepest, tally, begin, last)
-        for part in range(parts):
-            share = ti.cast(part, ti.f64) / parts
-            moments[count + part, 0] = begin
-            moments[count + part, 1] = share
-            moments[count + part, 2] = layers[begin, 0] + share * length
-        for k in range(begin, end):
-            starts[k] = count
-        count += parts
-        begin = end
-    return count
-
-
-@ti.func
-def straight_until(
-    mean: ti.template(),
-    least: ti.template(),
-    steepest: ti.template(),
-    tally: ti.template(),
-    begin,
-    last,
-):
-    """The next layer that is needed: until then means go straight on and densities hardly change."""
-    end = begin + 1
-    bent = steepest[begin]
-    goes_on = True
-    while goes_on and end < last:
-        bent += steepest[end]
-        goes_on = bent < ti.f64(BEND)
-        if goes_on:
-            goes_on = are_straight(mean, least, tally, begin, end + 1)
-        if goes_on:
-            end += 1
-    return end
 
 
 @kernel
@@ -539,7 +374,7 @@ def lay_near(
     objects,
     components,
 ):
-    """For each object at a moment a disc beyond which nothing is of it; radius -1: it is nowhere."""
+    """For each object at a moment a disc beyond which nothing is of it; radius -1: nowhere."""
     inf = ti.f64(math.inf)
     for at in range(first, first + objects):
         low, high = vec2(inf), vec2(-inf)
