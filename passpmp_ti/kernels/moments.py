@@ -64,7 +64,7 @@ SHARPER = 10
 ROUNDING = 1e-3
 """[m] of places in single precision."""
 MOMENT, KNOWN, ROW, GRID = 5, 24, 22, 9
-"""Numbers of a moment, of an object's component then in `known` and in `rows`, of one in `grids`."""
+"""Numbers of a moment, of a component then in `known`, of one in `rows`, of a layer in `grids`."""
 SHAPE, BENT, WIDE = 14, 22, 23
 """Where in `known`."""
 
