@@ -27,15 +27,15 @@ STAMP = 100.0
 TIMES = STAMP + 0.1 * np.arange(16)
 ANCHOR = (-3.0, 2.0)
 POSITION = (0.4, -0.2)
-KINDS = ["any", "sharp", "wide", "steep", "crossing", "bent", "light", "round", "far", "one"]
-KINDS += ["none"]
+KINDS = ["any", "sharp", "wide", "steep", "crossing", "bent", "waving", "light", "round", "far"]
+KINDS += ["one", "none"]
 
 
 def mixtures(kind: str, seed: int) -> Forecast:
     """Objects of two components each about the robot, of every kind that is told apart."""
     rng = np.random.default_rng(seed)
     count = {"one": 1, "none": 0}.get(kind, 7)
-    spread = {"sharp": 1e-2, "steep": 3e-2, "wide": 6.0}.get(kind, 1.0)
+    spread = {"sharp": 1e-2, "steep": 3e-2, "wide": 6.0, "waving": 6.0}.get(kind, 1.0)
     speed = {"steep": 6.0, "crossing": 2.0}.get(kind, 0.8)
     if not count:
         return Forecast(TIMES, *map(np.zeros, ((0, 2), (0, 2, 16, 4), (0, 2, 16, 4, 4), (0,))))
@@ -54,6 +54,9 @@ def mixtures(kind: str, seed: int) -> Forecast:
         # no constant velocity makes this of them: they turn, and their covariances shrink
         mean[..., :2] += 0.2 * np.sin(9 * np.arange(16))[:, None]
         covariance *= (1.0 - 0.06 * np.arange(16))[:, None, None]
+    if kind == "waving":
+        # to and fro, by less than what is cut into parts for
+        mean[..., ::2, 0] += 0.2
     if kind == "light":
         weight[::2, 1] = 1e-8
     if kind == "round":
@@ -100,7 +103,7 @@ def test_the_kinds_are_what_they_are_called():
     made = {kind: moments_of(*asked(kind, 0)) for kind in KINDS}
     parts = {kind: len(moments.times) for kind, moments in made.items()}
     assert parts["none"] == parts["far"] == 2
-    assert parts["wide"] < len(TIMES) < parts["steep"]
+    assert parts["wide"] < parts["waving"] <= len(TIMES) < parts["steep"]
     assert not made["far"].wanted.any()
     assert (made["far"].near[:, 2] == -1).all()
     assert 0 < made["any"].wanted.mean() < 1
