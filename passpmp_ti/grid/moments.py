@@ -91,10 +91,10 @@ def moments_of(
     layers = device.put(np.stack([times, reach.way(times)], axis=1))
     moments = device.empty((last * MOST_PARTS + 1, MOMENT), np.float64)
     starts = device.empty((last + 1,), np.int32)
-    rows = max(each, 1)
+    some = max(each, 1)
     count = choose_moments(
-        *given, layers, tally, device.empty((rows, last + 1), np.float64),
-        device.empty((rows, last), np.float64), device.empty((last,), np.float64), moments, starts,
+        *given, layers, tally, device.empty((some, last + 1), np.float64),
+        device.empty((some, last), np.float64), device.empty((last,), np.float64), moments, starts,
     )  # fmt: skip
     moments = device.host(moments)[:count]
     times = moments[:, 2].copy()

@@ -45,7 +45,7 @@ def choose_moments(
     radius: Numbers,
     robot: Numbers,
     layers: Table,  # [L, 2]: 0 time [s], 1 how far the robot may be then [m]
-    tally: Counts,  # [2]: 0 objects N, 1 components C
+    tally: Counts,
     # scratch
     least: Table,  # [N * C, L] lesser deviations, where what the nodes blur anyway is blurred [m]
     bends: Table,  # [N * C, L - 1] until the next layer, 0 where nobody meets the object
@@ -56,7 +56,8 @@ def choose_moments(
 ) -> ti.i32:  # J
     last = layers.shape[0] - 1
     length = robot[5]
-    ti.loop_config(parallelize=1)  # they are few, here and below: a second thread would not pay
+    # they are few, here and below: a second thread would cost more than it saves
+    ti.loop_config(parallelize=1)
     for i in range(tally[0] * tally[1]):
         n, c = i // tally[1], i % tally[1]
         before, shape_before = vec4(0.0), vec8(0.0)

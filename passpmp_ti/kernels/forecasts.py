@@ -28,9 +28,10 @@ LEFT_OUT = 2e-5
 SMALLEST = 1e-6
 """Components of less weight than this are not looked up: their weight is risk."""
 COARSEST = 1.2
-"""The same of the sharpest object; what is sharper is blurred."""
+"""Side of a cell of the layers of hazard [standard deviations of the sharpest object]; what is
+sharper is blurred."""
 MOST_SIDE = 28
-"""Nodes along a side of a layer."""
+"""Nodes along a side of a layer of hazard."""
 
 Numbers = ti.types.ndarray(dtype=ti.f64, ndim=1)
 Table = ti.types.ndarray(dtype=ti.f64, ndim=2)

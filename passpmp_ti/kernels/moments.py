@@ -51,14 +51,15 @@ from passpmp_ti.kernels.launch import kernel
 STEEPEST = 1.0
 """Bend from which on Gaussians are blurred."""
 TWICE_ROOT = 2 * math.sqrt(2)
+"""In double precision."""
 STRONGEST = 1.3
 """Bend that a margin can make up for."""
 LOST = 1e3
 """Margin where they are bent more than any bound allows for: the risk is 1."""
 MADE_UP = 1 / (1 - math.exp(-0.5 * BLUR * BLUR))
-"""That factor."""
+"""That factor: noise is no farther out in the rest of the cases."""
 NODE = 0.8
-"""Side of a cell of the layers [standard deviations of the sharper objects]."""
+"""Side of a cell of the layers of hazard [standard deviations of the sharper objects]."""
 SHARPER = 10
 """One object of so many is sharper than the sharper objects are."""
 ROUNDING = 1e-3
@@ -81,16 +82,15 @@ def lay_moments(
     weight: Table,
     radius: Numbers,
     robot: Numbers,
-    tally: Counts,  # [2]: 0 objects N, 1 components C
+    tally: Counts,
     # in and out
     moments: Table,
     # scratch
-    known: Table,  # [J * N * C, 24]: 0 mean, 4 covariance, 14 shape, 22 bend until the next moment,
-    # 23 how far about its mean the object is looked up; then the floor of its deviations [m]
+    known: Table,
     # out
     rows: Singles,  # [J * N * C, 22] of kernels/chances.py, node spacings of windows are missing
     near: Singles,  # [J * N, 3] of kernels/chances.py
-    wanted: Flags,  # [J * N * C]: the robot may meet it
+    wanted: Flags,
     sizes: Table,  # [J * N * C, 3]: deviations along the principal axes, radius of touch [m]
     grids: Singles,  # [J, 9] of kernels/hazard.py
     sides: Links,  # [2, J] nodes along the sides of a layer of hazard
@@ -98,6 +98,7 @@ def lay_moments(
     components = tally[1]
     each = tally[0] * components
     count = moments.shape[0]
+    # here and below: for some hundred rows a second thread costs more than it saves
     ti.loop_config(parallelize=1)
     for row in range(count * each):
         j, n, c = row // each, row % each // components, row % components
