@@ -96,7 +96,8 @@ def test_kernels_work_out_what_whole_arrays_do(kind):
             if name in ("wanted", "starts", "sides", "times"):
                 assert (values == wanted[name]).all(), name
                 continue
-            np.testing.assert_allclose(values, wanted[name], rtol=1e-6, err_msg=name)
+            # the sine of an angle is known to 1e-8 where its cosine is 1 but for rounding
+            np.testing.assert_allclose(values, wanted[name], rtol=1e-6, atol=1e-7, err_msg=name)
 
 
 def test_the_kinds_are_what_they_are_called():
