@@ -107,4 +107,5 @@ def _taichi_type(dtype: Any) -> Any:
         "int32": ti.i32,
         "uint32": ti.u32,
         "float32": ti.f32,
+        "float64": ti.f64,
     }[np.dtype(dtype).name]

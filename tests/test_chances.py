@@ -14,12 +14,12 @@ from oracle.forecasts import (
     gaussian,
     ring_flow,
 )
+from oracle.moments import Shape, bends_of
 from scipy.special import erf
 
 import passpmp_ti as pti
 from passpmp_ti import device
 from passpmp_ti.grid.chances import body_radius, chances_of, points_of, sample_steps
-from passpmp_ti.grid.gaussians import Shape, bends_of
 from passpmp_ti.kernels.hazard import hazard_at
 from passpmp_ti.kernels.risk import Counts, Links, Numbers, Table, vec2
 

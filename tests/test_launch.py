@@ -7,9 +7,11 @@ import numpy as np
 import pytest
 import taichi as ti
 
+from passpmp_ti import device
 from passpmp_ti.kernels.launch import kernel
 
 Values = ti.types.ndarray(dtype=ti.f32, ndim=1)
+Doubles = ti.types.ndarray(dtype=ti.f64, ndim=1)
 Pairs = ti.types.ndarray(dtype=ti.types.vector(2, ti.f32), ndim=1)
 
 
@@ -22,6 +24,12 @@ def scaled(
         for _ in ti.static(range(power - 1)):
             result *= values[n]
         out[n] = result
+
+
+@kernel
+def halved(values: Doubles, out: Doubles):
+    for n in range(values.shape[0]):
+        out[n] = values[n] / 2
 
 
 @kernel
@@ -75,6 +83,20 @@ def test_arrays_of_a_device_and_of_the_host_may_take_turns():
         scaled(1, given, 2.0, 0, 0, out)
         scaled(1, there, 2.0, 0, 0, back)
         assert (back.to_numpy() == out).all()
+
+
+def test_arrays_of_doubles_are_handed_over_too():
+    with device.forced():
+        there, back = device.put(values().astype(float) / 3), device.empty((5,), float)
+    for _ in range(3):
+        given, out = values().astype(float) / 3, np.empty(5)
+        halved(given, out)
+        halved(there, back)
+        assert (out == given / 2).all()
+        assert (device.host(back) == out).all()
+    # single ones are none of them
+    with pytest.raises(ValueError, match="dtype=f64"):
+        halved(values(), out)
 
 
 def test_arrays_of_vectors_are_handed_over_too():

@@ -10,11 +10,12 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from passpmp_ti import device, door
-from passpmp_ti.grid.moments import LEFT_OUT, Forecast, Moments, moments_of
+from passpmp_ti.grid.moments import Forecast, Moments, moments_of
 from passpmp_ti.grid.reach import Reach
 from passpmp_ti.grid.reused import Reused
 from passpmp_ti.grid.window import Window
 from passpmp_ti.kernels.chances import CHANNELS, MOST_POINTS, SCRATCH, rasterise_windows
+from passpmp_ti.kernels.forecasts import LEFT_OUT
 from passpmp_ti.kernels.hazard import KINDS, lay_hazard
 from passpmp_ti.kernels.touched import layer_chances
 from passpmp_ti.robots import Robot

@@ -27,6 +27,7 @@ ARRAYS = {
     id(ti.i32): np.dtype(np.int32),
     id(ti.u32): np.dtype(np.uint32),
     id(ti.f32): np.dtype(np.float32),
+    id(ti.f64): np.dtype(np.float64),
 }
 
 
