@@ -12,6 +12,9 @@ from passpmp_ti import door, kernel_cache, probe
 
 BACKENDS = ("auto", "cpu", "cuda", "vulkan", "metal")
 
+SINGLE = ("vulkan", "metal")
+"""Backends on which kernels in double precision cannot be relied on."""
+
 _running: str | None = None
 _log = logging.getLogger("passpmp_ti")
 
@@ -83,6 +86,11 @@ def init(backend: str = "auto", threads: int | None = None, *, debug: bool = Fal
     _running = wanted
     _log.info("kernels run on %s", wanted)
     return wanted
+
+
+def has_doubles() -> bool:
+    """Whether kernels may work in double precision on the backend that runs."""
+    return _running not in SINGLE
 
 
 def _chosen() -> str:

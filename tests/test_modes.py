@@ -10,7 +10,7 @@ import pytest
 
 import passpmp_ti as pti
 import passpmp_ti.grid.model as model_module
-from passpmp_ti import device
+from passpmp_ti import backend, device
 from passpmp_ti.grid import tubes
 from passpmp_ti.grid.reused import Reused
 from passpmp_ti.grid.view import labels_of, views_of
@@ -314,3 +314,18 @@ def test_memory_is_handed_out_again_when_nobody_holds_it():
     third = memory.floats(900)
     assert third.ctypes.data == place
     assert (second == 2.0).all()
+
+
+@pytest.mark.parametrize(("running", "mode", "refused"), [
+    ("metal", "probabilistic", True), ("vulkan", "probabilistic", True),
+    ("metal", "hybrid", False), ("cuda", "probabilistic", False),
+])  # fmt: skip
+def test_a_backend_without_double_precision_weighs_no_risks(running, mode, refused, monkeypatch):
+    settings = settings_of(mode)
+    pti.init("cpu")
+    monkeypatch.setattr(backend, "_running", running)
+    if not refused:
+        pti.Navigator(ROBOT, settings, (1.0, 0.0))
+        return
+    with pytest.raises(ValueError, match="double precision"):
+        pti.Navigator(ROBOT, settings, (1.0, 0.0))

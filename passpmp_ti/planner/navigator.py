@@ -67,7 +67,13 @@ class Navigator:
         *,
         seed: int | np.random.Generator = 0,
     ) -> None:
-        backend.init()
+        running = backend.init()
+        if settings.mode == "probabilistic" and not backend.has_doubles():
+            raise ValueError(
+                'Settings.mode = "probabilistic" works out its Gaussians in double precision, which'
+                f' the backend "{running}" may not have; take mode="conservative" or "hybrid", or'
+                ' init("cpu") or init("cuda") in a new process'
+            )
         self.robot = robot
         self.settings = settings
         self.static_map = static_map
