@@ -9,6 +9,7 @@ from oracle import exact
 from passpmp_ti import DifferentialDrive, Settings
 from passpmp_ti.grid.model import FutureModel
 from passpmp_ti.planner.guide import Guide
+from passpmp_ti.planner.plan import roomiest
 from passpmp_ti.planner.stall import REACH, SINK, Hill, Stall
 from passpmp_ti.sim.episode import simulate
 from passpmp_ti.sim.lidar import Lidar
@@ -132,19 +133,63 @@ PILLAR = np.array([24.97, 6.95]) + 0.98 * np.stack([np.cos(CORNERS), np.sin(CORN
 """Beside this one standing looks best, from where `driven` begins."""
 
 
-def driven(patience):
+def driven(patience, start=(23.777, 7.994, -1.145), seconds=22.0, labels="sensor", see=None):
     scenario = Scenario(
         name="pillar", robot=ROBOT, settings=SETTINGS.changed(patience=patience),
-        lidars=(Lidar(range_max=10.0, beams=720, field_of_view=2 * np.pi, labels="sensor"),),
-        bounds=(-2.0, -2.0, 32.0, 32.0), polygons=(PILLAR,), start=(23.777, 7.994, -1.145),
-        goals=((28.0, 2.0),), duration=22.0,
+        lidars=(Lidar(range_max=10.0, beams=720, field_of_view=2 * np.pi, labels=labels),),
+        bounds=(-2.0, -2.0, 32.0, 32.0), polygons=(PILLAR,), start=start, goals=((28.0, 2.0),),
+        duration=seconds,
     )  # fmt: skip
-    return simulate(scenario, seed=0)
+    return simulate(scenario, seed=0, on_cycle=see)
+
+
+def gone(episode):
+    """[n] how far from its start [m]."""
+    return np.hypot(*(episode.states[:, :2] - episode.states[0, :2]).T)
 
 
 def test_a_robot_that_stalls_backs_out_and_arrives():
     for_good, patient = driven(None), driven(PATIENCE)
     assert not for_good.summary()["reached_goal"]
-    assert np.hypot(*(for_good.states[:, :2] - for_good.states[0, :2]).T).max() < NEAR
+    assert gone(for_good).max() < NEAR
     assert patient.summary()["reached_goal"]
     assert patient.summary()["collisions_moving"] == 0
+
+
+LOCKED = (23.747, 8.020, -1.145)
+"""Half a metre beside the pillar, where that may begin to move: it would be here within 0.2 s."""
+
+
+def test_a_robot_that_no_primitive_frees_leaves_by_shorter_motions():
+    shorter = []
+
+    def see(info):
+        held = info.navigator.record.chosen
+        if info.navigator.record.decision == "new" and held.duration <= SETTINGS.cycle + 1e-9:
+            shorter.append(held)
+
+    for_good = driven(None, LOCKED, 3.0, "none")
+    patient = driven(PATIENCE, LOCKED, 12.0, "none", see)
+    assert gone(for_good).max() == 0.0
+    assert len(shorter) > 3
+    assert gone(patient).max() > NEAR
+    assert patient.summary()["collisions_moving"] == 0
+
+
+def test_what_is_shorter_leads_to_where_more_time_is_left_and_is_free():
+    kept = []
+    driven(None, LOCKED, 0.5, "none", lambda info: kept.append((info.navigator.record, info.state)))
+    record, state = kept[-1]
+    assert record.tree.stays
+    model, start = record.model, record.stamp + SETTINGS.cycle
+    way = roomiest(model, state, start)
+    assert not model.touched(way.states, way.times).any()
+    before, after = model.room(np.stack([state, way.states[-1]]))
+    assert after > before
+    assert 0.0 < before < 0.5
+    # where there is nothing to gain there is no motion
+    open_ = FutureModel.from_scan(
+        exact.sweep(exact.world_of(), (0.0, 0.0, 0.0), 180, 2 * np.pi, 4.0, 0.0), ROBOT,
+        SETTINGS.changed(object_speed=0.0),
+    )  # fmt: skip
+    assert roomiest(open_, np.zeros(5), SETTINGS.cycle) is None

@@ -312,6 +312,22 @@ class FutureModel:
         arrival[inside] = self._on_host("ticks")[j[inside], i[inside]]
         return (arrival <= ticks) & (arrival != NEVER)
 
+    def room(self, states: np.ndarray) -> np.ndarray:
+        """About how long nothing could touch a robot that rests in states [n, 5], from the scan on
+        [s]; between the values of cells, so it proves nothing: it says where there is more."""
+        along = np.array([offset for offset, _ in self.robot.discs])[:, None]
+        x = states[:, 0] + along * np.cos(states[:, 2]) - self.origin[0]
+        y = states[:, 1] + along * np.sin(states[:, 2]) - self.origin[1]
+        ticks = self._on_host("ticks")
+        most = self.window.size - 2
+        u, v = (np.clip(part / self.cell - 0.5, 0.0, most) for part in (x, y))
+        i, j = u.astype(np.int64), v.astype(np.int64)
+        u, v = u - i, v - j
+        low = ticks[j, i] * (1 - u) + ticks[j, i + 1] * u
+        high = ticks[j + 1, i] * (1 - u) + ticks[j + 1, i + 1] * u
+        until = self.base + TICK * (low * (1 - v) + high * v).min(axis=0)
+        return np.asarray(until - self.stamp)
+
     def passively_safe(self, states: np.ndarray, times: np.ndarray) -> np.ndarray:
         """Whether each state can be braked to rest before anything can touch the robot (eq. 6).
 

@@ -24,6 +24,7 @@ from passpmp_ti.planner.plan import (
     brake_at_once,
     braking_off,
     calmest,
+    roomiest,
     still_clear,
     trajectory_to,
 )
@@ -334,6 +335,12 @@ class Navigator:
                 plan = trajectory_to(tree, leaf)
                 if not still_clear(model, plan):
                     plan, reason = None, "the new plan did not stand its second check"
+        # no hill moves a robot that can go nowhere, or only where it came from
+        locked = plan is None and hill is not None and (tree.stays or self._stall.stuck)
+        if locked and self.robot.at_rest(root):
+            plan = roomiest(model, root, start)
+            if plan is not None:
+                reason, cost_new = "", trajectory_cost(plan, start, guide, settings, self.robot)
         calmed = plan is None and math.isinf(cost_held)
         if calmed:
             plan = calmest(model, self.held, root, start)

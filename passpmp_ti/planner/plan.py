@@ -13,6 +13,11 @@ from passpmp_ti.planner.risk import risk_of, safety_weight
 from passpmp_ti.planner.tree import Tree, follow
 from passpmp_ti.trajectory import Trajectory
 
+NUDGES = (2, 3, 4)
+"""What is over before a primitive would be gathers speed for one of these parts of a cycle."""
+MORE_ROOM = 1e-4
+"""[s] of time left that a motion has to gain."""
+
 
 def trajectory_to(tree: Tree, leaf: int) -> Trajectory:
     """The plan that ends at `leaf`, then the braking trajectory that proved the leaf p-safe."""
@@ -26,6 +31,33 @@ def braking_from(model: FutureModel, state: np.ndarray, start: float, control: i
     """Braking at once from `state` [5] at `start` [s] by one control of the braking set."""
     pose = to_poses(state[None], model.window.anchor)[0]
     return _as_trajectory(model, pose, [(model.body.braking[control], -1)], start, 0)
+
+
+def roomiest(model: FutureModel, root: np.ndarray, start: float) -> Trajectory | None:
+    """Out of where nothing else is free, from rest at `root` [5] at `start` [s]: of all motions
+    that are over before a primitive and its braking would be, the one that leads to where most time
+    is left until something may come; None where none is free, or leads to more.
+
+    Where something may come out right beside the robot every primitive lasts too long, however
+    slowly it leaves. What is shorter is checked as every plan is; a few millimetres later there is
+    time for more.
+    """
+    pose = to_poses(root[None], model.window.anchor)[0]
+    cycle, brake = model.settings.levels[0], (model.body.braking[0], -1)
+    ways = [
+        _as_trajectory(model, pose, [(control, cycle // part), brake], start, cycle // part)
+        for part in NUDGES if cycle // part
+        for control in model.body.controls
+    ]  # fmt: skip
+    rooms = model.room(np.stack([root, *(way.states[-1] for way in ways)]))
+    for n in np.argsort(-rooms[1:], kind="stable"):
+        if rooms[1 + n] <= rooms[0] + MORE_ROOM:
+            return None
+        risk = risk_of(model, ways[n], start)
+        allowed = math.isfinite(safety_weight(model.settings, risk, ways[n].duration))
+        if allowed and still_clear(model, ways[n]):
+            return ways[n]
+    return None
 
 
 def brake_at_once(model: FutureModel, state: np.ndarray, start: float) -> Trajectory:

@@ -62,6 +62,8 @@ class Stall:
         self._left = 0.0  # stamp of that
         self._times = 0  # how often the robot stalled there
         self._raising = False
+        self.stuck = False
+        """Whether it did not leave for another patience."""
 
     def look(self, stamp: float, x: float, y: float) -> Hill | None:
         """Where the robot is short of its goal, once a cycle.
@@ -78,6 +80,7 @@ class Stall:
         if self._here is None or math.dist(self._here, (x, y)) > self._near:
             self._here, self._since, self._raising = (x, y), stamp, False
         over = stamp - self._since - self._patience
+        self.stuck = over > self._patience
         if over > 0.0:
             self._raise(stamp, over, self._here)
         return self._sunk(stamp)

@@ -50,6 +50,8 @@ LONGEST = 0.004
 """[s] that a chunk may take where there is a deadline: the clock is looked at between chunks."""
 FILLED = 0.5
 """Share of the memory that a tree may fill: the rest is for the model, the swarm and others."""
+STILL = 1e-5
+"""Places that are no farther apart are one [m]."""
 DEEPEST = 64
 """Levels that a plan is read back from."""
 
@@ -146,6 +148,12 @@ class Tree:
         parent = int(self.link[node, PARENT])
         path = follow(self.model, self.pose[parent], self.controls_to(node)[-1:])
         return to_states(path, self.model.window.anchor)[:, :2]
+
+    @property
+    def stays(self) -> bool:
+        """Whether every motion that was kept ends where the root is."""
+        places = device.host(self.pose)[: self.count, :2]
+        return bool(np.abs(places - self.root[:2]).max() < STILL)
 
     def path(self, node: int) -> np.ndarray:
         """[m, 2] world points of the plan that leads to `node`."""
