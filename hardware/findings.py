@@ -12,6 +12,8 @@ from dataclasses import dataclass, field
 
 LONGEST = 1.0
 """[s] of this thread's work that an input may take."""
+MOST_TOLD = 2000
+"""Characters of an input that failed."""
 
 
 @dataclass(slots=True)
@@ -28,7 +30,11 @@ class Findings:
     slowest_target: str = ""
 
     def attempt(
-        self, name: str, data: bytes, eat: Callable[[], object], refusal: type[Exception]
+        self,
+        name: str,
+        data: object,
+        eat: Callable[[], object],
+        refusal: type[Exception] | tuple[()],
     ) -> None:
         """Let a target eat an input, and note what came of it.
 
@@ -36,7 +42,7 @@ class Findings:
             name: of the target.
             data: the input, for the report.
             eat: hands it over.
-            refusal: what the protocol itself may raise.
+            refusal: what the protocol itself may raise; (): nothing.
         """
         began = time.thread_time()
         try:
@@ -44,12 +50,17 @@ class Findings:
         except refusal:
             self.refused += 1
         except Exception:
-            self.failures.append(f"{name}: {data!r}\n{traceback.format_exc(limit=4)}")
+            self.failures.append(f"{name}: {_told(data)}\n{traceback.format_exc(limit=4)}")
         took = time.thread_time() - began
         if took > self.slowest:
             self.slowest, self.slowest_target = took, name
         if took > LONGEST:
-            self.failures.append(f"{name}: {took:.1f} s for {data!r}")
+            self.failures.append(f"{name}: {took:.1f} s for {_told(data)}")
+
+
+def _told(data: object) -> str:
+    told = repr(data)
+    return told if len(told) <= MOST_TOLD else f"{told[:MOST_TOLD]}... ({len(told)} characters)"
 
 
 def broken(right: list[bytes], draw: random.Random) -> bytes:
