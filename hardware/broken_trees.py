@@ -19,7 +19,7 @@ TEXTS = (
     "nan", "x" * 5000, "- [", "{",
 )  # fmt: skip
 """Names that are in use make loops of frames."""
-THINGS = (
+THINGS: tuple[Any, ...] = (
     None, True, False, 3, 0.5, "text", b"bytes", (), [], {}, [[]], {"x": 1}, {3: 4}, [None], object
 )  # fmt: skip
 """Of a type that may be another than is asked for."""
@@ -87,7 +87,8 @@ def _broken(value: Any, draw: random.Random) -> Any:
     if isinstance(value, np.ndarray):
         return _broken_array(value, draw)
     if isinstance(value, list):
-        return draw.choice(([], value[:-1], value + value, [*value, draw.choice(THINGS)], value[0:1] * 40))
+        longer = [*value, draw.choice(THINGS)]
+        return draw.choice(([], value[:-1], value + value, longer, value[:1] * 40))
     return draw.choice(THINGS)
 
 

@@ -102,6 +102,11 @@ class Planners:
         self._draw = draw
         self._topics = list(TOPICS)
         self._renew()
+        # kernels are compiled before anything is timed
+        for rolls in (False, False, True):
+            self._tell(list(TOPICS))
+            self._plan(rolls=rolls, shows=True)
+        self._renew()
 
     def made(self, draw: random.Random) -> tuple[str, Any]:
         topic = draw.choice(self._topics)
@@ -132,15 +137,23 @@ class Planners:
             self._port.hears["odom"](as_message(RIGHT[ODOMETRY](time.time())))
 
     def _cycle(self) -> None:
-        draw, planner, hears = self._draw, self.planner, self._port.hears
+        draw = self._draw
         told = [topic for topic in TOPICS if draw.random() < TOLD and topic != "scan"]
-        for topic in (*told, "scan"):  # a cycle without a scan would wait for one
-            hears[topic](as_message(RIGHT[TOPICS[topic]](time.time())))
-        self._link.roll(rolls=draw.random() < 0.3)
+        self._tell([*told, "scan"])  # a cycle without a scan would wait for one
+        self._plan(rolls=draw.random() < 0.3, shows=draw.random() < 0.1)
+
+    def _tell(self, topics: list[str]) -> None:
+        """What is right."""
+        for topic in topics:
+            self._port.hears[topic](as_message(RIGHT[TOPICS[topic]](time.time())))
+
+    def _plan(self, *, rolls: bool, shows: bool) -> None:
+        planner = self.planner
+        self._link.roll(rolls=rolls)
         planner.cycle(self._link, 0.0)  # type: ignore[arg-type]
         if planner.navigator.record.fault:
             raise AssertionError(f"a cycle that failed: {planner.navigator.record.fault}")
-        if draw.random() < 0.1:
+        if shows:
             planner.show()
             planner.tell(self._link)  # type: ignore[arg-type]
         if len(planner.unseen) > MOST_REASONS + 1:
@@ -207,11 +220,9 @@ class Bases:
 
 
 def _status(state: State) -> Status:
-    nothing = {"held": (0, 0), "newest": (0, 0), "judged": (0, 0), "rests": (1.0, 2.0, 0.3)}
-    numbers = dict.fromkeys(
-        ("stamp", "rests_from", "error", "worst_error", "right", "left"), 0.0
-    ) | dict.fromkeys(("taken", "refused", "garbled", "overruns"), 0)
     return Status(
-        state=state, reason=Reason.NONE, verdict=Verdict.NONE, odometry=(MOVED,), **nothing,
-        **numbers,
+        stamp=0.0, state=state, reason=Reason.NONE, held=(0, 0), newest=(0, 0),
+        rests=(1.0, 2.0, 0.3), rests_from=0.0, judged=(0, 0), verdict=Verdict.NONE, error=0.0,
+        worst_error=0.0, right=0.0, left=0.0, taken=0, refused=0, garbled=0, overruns=0,
+        odometry=(MOVED,),
     )  # fmt: skip

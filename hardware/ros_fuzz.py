@@ -20,7 +20,7 @@ import random
 import sys
 from collections.abc import Callable
 from functools import partial
-from typing import Protocol
+from typing import Any, Protocol
 
 from hardware import ros1
 from hardware.findings import Findings, carry_out
@@ -30,8 +30,8 @@ from hardware.fuzzed_messages import Readers
 from hardware.fuzzed_wires import dds_wire, ros1_wire
 
 SHARES = {
-    "reader": 0.55, "planner": 0.25, "base": 0.12, "ros1": 0.03, "dds": 0.02, "recording": 0.002,
-    "config": 0.008, "parameters": 0.02,
+    "reader": 0.5, "planner": 0.25, "base": 0.1, "ros1": 0.05, "dds": 0.05, "recording": 0.005,
+    "config": 0.02, "parameters": 0.025,
 }  # fmt: skip
 """Of the inputs; files take the longest."""
 
@@ -39,13 +39,14 @@ SHARES = {
 class Target(Protocol):
     """Something that is fed."""
 
-    refusal: type[Exception]
-    """What it may raise."""
+    @property
+    def refusal(self) -> type[Exception] | tuple[()]:
+        """What it may raise; (): nothing."""
 
-    def made(self, draw: random.Random) -> object:
+    def made(self, draw: random.Random) -> Any:
         """An input that was right, once."""
 
-    def eat(self, data: object) -> None:
+    def eat(self, data: Any) -> None:
         """Let it have the input."""
 
     def close(self) -> None:
