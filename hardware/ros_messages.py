@@ -15,6 +15,7 @@ import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import wraps
+from operator import index
 from typing import Any, ParamSpec, TypeVar
 
 import numpy as np
@@ -119,7 +120,7 @@ def sweep_of(message: Any, *, range_max: float, beyond_is_free: bool = False) ->
     n = len(ranges)
     if ranges.ndim != 1 or n > MOST_BEAMS:
         raise Untrusted(f"a scan of more than {MOST_BEAMS} beams, or none")
-    if n < 2 or not all(map(math.isfinite, (low, step, near))) or step == 0.0 or not far > 0.0:
+    if n < 2 or not all(map(math.isfinite, (low, step, near))) or step == 0.0 or not far > TOO_NEAR:
         raise Untrusted("a scan without beams, bearings or range")
     last = low + (n - 1) * step
     # float32 sums angles up; more than a beam off, and nobody knows which beam looks where
@@ -375,10 +376,12 @@ def static_map_of(message: Any) -> tuple[str, StaticMap]:
     """
     info = message.info
     x, y, yaw = planar(info.origin.position, info.origin.orientation, UPRIGHT)
-    data = np.array(message.data, dtype=np.int16)
-    if not len(data) or len(data) != info.width * info.height:
-        raise Untrusted(f"a map of {info.width} times {info.height} cells with {len(data)} values")
-    occupied = data.reshape(info.height, info.width) == OCCUPIED
+    data = np.asarray(message.data)
+    width, height = index(info.width), index(info.height)
+    if not len(data) or len(data) != width * height:
+        raise Untrusted(f"a map of {width} times {height} cells with {len(data)} values")
+    # no cast before this: a number that wraps round to it, or a text, is not surely occupied
+    occupied = data.reshape(height, width) == OCCUPIED
     # the shortest number that is this float32: 0.05 and not 0.0500000007, or a ring of cells that
     # lie just as far from a wall as is tolerated would be lost; 1000 cells shift by 1 um
     with np.errstate(over="ignore"):
