@@ -16,7 +16,7 @@ from hardware.fuzzed_messages import MOVED, NOW, RIGHT
 from hardware.ros_base import RosBase, placer
 from hardware.ros_clock import RosClock
 from hardware.ros_frames import MOST_FRAMES, Frames
-from hardware.ros_messages import Tree, stop_of, transforms_of
+from hardware.ros_messages import FARTHEST, Tree, stop_of, transforms_of
 from hardware.ros_planner import MOST_REASONS, Planner
 from hardware.ros_port import BOOL, GRID, ODOMETRY, POSE, SCAN, TRANSFORMS
 from hardware.ros_settings import RosSettings
@@ -41,6 +41,8 @@ RENEWED = 1000
 WHEELS = (math.nan, math.inf, -math.inf, 0.0, 0.5, -0.5, 5.0, -1e30, 1e308, -1e308)
 FIRST = 0.9
 """Of the planners hear right odometry first."""
+PLACES = (*(1.0,) * 20, 1.1, -5.0, 1e5, 0.999 * FARTHEST)
+"""Where the executor has the robot: mostly it stays there [m]."""
 AGES = (-1e9, -20.0, -0.5, -1e-3, 0.0, 0.0, 0.0, 0.0, 1e-3, 0.5, 20.0, 1e9)
 """Of stamps; below 0: of the future [s]."""
 
@@ -70,8 +72,9 @@ class StubLink:
         self.ready, self.following = True, None
         self.status = _status(State.RESTING)
 
-    def roll(self, *, rolls: bool) -> None:
-        """Begin to roll, or stand."""
+    def roll(self, *, rolls: bool, x: float = 1.0) -> None:
+        """Begin to roll, or stand, at a place."""
+        self.state[0] = x
         self.state[3:] = 0.2 if rolls else 0.0
         self.status = _status(State.FOLLOWING if rolls else State.RESTING)
 
@@ -140,16 +143,16 @@ class Planners:
         draw = self._draw
         told = [topic for topic in TOPICS if draw.random() < TOLD and topic != "scan"]
         self._tell([*told, "scan"])  # a cycle without a scan would wait for one
-        self._plan(rolls=draw.random() < 0.3, shows=draw.random() < 0.1)
+        self._plan(rolls=draw.random() < 0.3, shows=draw.random() < 0.1, x=draw.choice(PLACES))
 
     def _tell(self, topics: list[str]) -> None:
         """What is right."""
         for topic in topics:
             self._port.hears[topic](as_message(RIGHT[TOPICS[topic]](time.time())))
 
-    def _plan(self, *, rolls: bool, shows: bool) -> None:
+    def _plan(self, *, rolls: bool, shows: bool, x: float = 1.0) -> None:
         planner = self.planner
-        self._link.roll(rolls=rolls)
+        self._link.roll(rolls=rolls, x=x)
         planner.cycle(self._link, 0.0)  # type: ignore[arg-type]
         if planner.navigator.record.fault:
             raise AssertionError(f"a cycle that failed: {planner.navigator.record.fault}")

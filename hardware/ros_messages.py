@@ -38,6 +38,9 @@ UPRIGHT = 0.02
 """A range finder may lean by this [rad]: its beams then reach 2 mm less far at 10 m."""
 LEVEL = 0.2
 """A robot may lean by this on its way [rad]."""
+FARTHEST = 1e9
+"""No place is farther away than this [m]; there float64 still tells 0.1 um, and what is reckoned
+from rounding stays small."""
 MOST_BEAMS = 16_384
 """Of a scan; what is made of one must not take longer than a cycle."""
 MOST_LETTERS = 256
@@ -276,10 +279,10 @@ def place_of(message: Any) -> tuple[str, float, float]:
     """(frame, x, y) of a geometry_msgs/PoseStamped.
 
     Raises:
-        Untrusted: numbers that are none.
+        Untrusted: numbers that are none, or beyond `FARTHEST`.
     """
     x, y = float(message.pose.position.x), float(message.pose.position.y)
-    if not (math.isfinite(x) and math.isfinite(y)):
+    if not (abs(x) <= FARTHEST and abs(y) <= FARTHEST):
         raise Untrusted(f"a goal at ({x:g}, {y:g})")
     return frame_of(message), x, y
 
@@ -431,8 +434,11 @@ def planar(position: Any, orientation: Any, lean: float) -> Pose:
     """(x, y, theta) of a pose whose z axis is upright within `lean` [rad].
 
     Raises:
-        Untrusted: it is not, or the orientation is no quaternion.
+        Untrusted: it is not, the orientation is no quaternion, or the place is beyond `FARTHEST`.
     """
+    place = float(position.x), float(position.y)
+    if any(FARTHEST < abs(p) < math.inf for p in place):
+        raise Untrusted(f"a place farther away than {FARTHEST:g} m")
     x, y, z, w = (float(getattr(orientation, name)) for name in "xyzw")
     norm = x * x + y * y + z * z + w * w
     if not abs(norm - 1.0) < 0.02:
@@ -440,4 +446,4 @@ def planar(position: Any, orientation: Any, lean: float) -> Pose:
     if 1.0 - 2.0 * (x * x + y * y) / norm < math.cos(lean):
         raise Untrusted(f"an orientation that leans by more than {lean:g} rad")
     theta = math.atan2(2 * (w * z + x * y), norm - 2 * (y * y + z * z))
-    return float(position.x), float(position.y), theta
+    return *place, theta
