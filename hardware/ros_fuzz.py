@@ -25,7 +25,7 @@ from typing import Any, Protocol
 from hardware import ros1
 from hardware.findings import Findings, carry_out
 from hardware.fuzzed_files import Configs, Parameters, Recordings
-from hardware.fuzzed_listeners import Bases, Planners
+from hardware.fuzzed_listeners import TOPICS, Bases, Planners
 from hardware.fuzzed_messages import Readers
 from hardware.fuzzed_wires import dds_wire, ros1_wire
 
@@ -68,8 +68,9 @@ TARGETS: dict[str, Callable[[random.Random], Target]] = {
 def missing() -> dict[str, str]:
     """{target: what it needs} of those that cannot be tried here."""
     found = {}
-    if not ros1.there("rospy"):
-        found["ros1"] = "rospy"
+    for package in ("rospy", *sorted({kind.partition("/")[0] for kind in TOPICS.values()})):
+        if not ros1.there(package):
+            found["ros1"] = package
     for name, package in (("dds", "cyclonedds"), ("recording", "rosbags")):
         if importlib.util.find_spec(package) is None:
             found[name] = package

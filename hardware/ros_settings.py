@@ -284,8 +284,9 @@ def read_parameters(path: str | Path) -> dict[str, Any]:
     """
     try:
         told = yaml.safe_load(Path(path).read_text())
-    except (OSError, yaml.YAMLError, ValueError, TypeError, AttributeError, LookupError) as cause:
-        # a tag, as `!!bool maybe`, has PyYAML raise all of these
+    except Exception as cause:
+        # values within each other by the hundred, and tags as `!!bool maybe`, have PyYAML raise
+        # whatever comes
         raise ValueError(f"{path}: cannot be read; {cause}") from cause
     if told is not None and not isinstance(told, dict):
         raise ValueError(f"{path}: must hold names and values; got {told!r}")
