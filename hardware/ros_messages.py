@@ -117,7 +117,8 @@ def sweep_of(message: Any, *, range_max: float, beyond_is_free: bool = False) ->
     Raises:
         Untrusted: its bearings or ranges make no sense.
     """
-    ranges = np.array(message.ranges, dtype=np.float64)
+    with np.errstate(invalid="ignore"):  # a NaN that signals, once it is cast
+        ranges = np.array(message.ranges, dtype=np.float64)
     low, step = float(message.angle_min), float(message.angle_increment)
     near, far = float(message.range_min), float(message.range_max)
     n = len(ranges)
