@@ -137,7 +137,7 @@ def messages(path: str | Path, kinds: Iterable[str]) -> Iterator[Recorded]:
     except Exception as cause:
         # rosbags trusts a file's own numbers: a broken one has it raise anything
         raise ValueError(
-            f"{path}: not a recording that can be read: {cause or type(cause).__name__}"
+            f"{path}: not a recording that can be read: {str(cause) or type(cause).__name__}"
         ) from cause
 
 

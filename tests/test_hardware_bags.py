@@ -169,6 +169,15 @@ def test_a_broken_recording_is_refused_by_name_whatever_its_reader_raises(
     assert len(capsys.readouterr().err.splitlines()) == 1
 
 
+def test_a_replay_with_a_robot_s_file_that_is_none_ends_with_one_line(tmp_path, capsys):
+    drive(tmp_path / "drive.bag", 0.2)
+    (tmp_path / "robot.yaml").write_text("settings: 5\n")
+    given = ["replay", str(tmp_path / "drive.bag"), "--config", str(tmp_path / "robot.yaml")]
+    assert main(given) == 2
+    (told,) = capsys.readouterr().err.splitlines()
+    assert "settings must be names and values" in told
+
+
 def test_odometry_of_no_robot_is_refused_by_name(tmp_path):
     # braking from such a speed would be reckoned step by step, without an end
     for name, speed in (("fast", 1e9), ("none", math.nan)):
