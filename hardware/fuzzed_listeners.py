@@ -127,10 +127,6 @@ class Planners:
     def close(self) -> None:
         pass
 
-    def hear(self, topic: str, message: Any) -> None:
-        """Hear a message, and now and then plan."""
-        self.eat((topic, message))
-
     def _renew(self) -> None:
         self._port, self._link = StubPort(), StubLink()
         self.planner = Planner(self._port, SETTINGS)
