@@ -119,7 +119,7 @@ def messages(path: str | Path, kinds: Iterable[str]) -> Iterator[Recorded]:
         ValueError: there is no such recording, or it cannot be read.
     """
     check_installed()
-    from rosbags.highlevel import AnyReader, AnyReaderError
+    from rosbags.highlevel import AnyReader
     from rosbags.typesys import Stores
 
     path, wanted = Path(path), set(kinds)
@@ -134,8 +134,11 @@ def messages(path: str | Path, kinds: Iterable[str]) -> Iterator[Recorded]:
             for connection, time, data in reader.messages(connections=chosen):
                 message = reader.deserialize(data, connection.msgtype)
                 yield Recorded(connection.topic, _short(connection.msgtype), time * 1e-9, message)
-    except AnyReaderError as cause:
-        raise ValueError(f"{path}: not a recording that can be read: {cause}") from cause
+    except Exception as cause:
+        # rosbags trusts a file's own numbers: a broken one has it raise anything
+        raise ValueError(
+            f"{path}: not a recording that can be read: {str(cause) or type(cause).__name__}"
+        ) from cause
 
 
 def _types(store: Any) -> Any:

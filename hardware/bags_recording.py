@@ -18,7 +18,7 @@ from hardware.ros_messages import (
     Pose,
     Untrusted,
     motion_of,
-    seconds,
+    stamp_of,
     static_map_of,
     sweep_of,
     transforms_of,
@@ -29,6 +29,8 @@ from passpmp_ti.scan import Scan
 
 LONGEST_GAP = 1.0
 """Where the robot was is not known between two poses that are farther apart than this [s]."""
+FASTEST = 100.0
+"""Odometry of wheels that turn faster than this is of no robot [m/s]."""
 SPEEDS_FROM_POSES = 0.2
 """Time over which speeds are taken from poses where the odometry tells none [s]."""
 
@@ -108,14 +110,22 @@ class Recording:
         way = [(m.stamp, *m.pose, m.speed, m.turn_rate) for m in motions] or [
             (when, *pose, 0.0, 0.0) for when, child, pose in moved if child == self.base_frame
         ]
-        if len(way) < 2:
+        # what is no number is no place
+        rows = np.array(way).reshape(-1, 6)
+        rows = rows[np.isfinite(rows).all(axis=1)]
+        if len(np.unique(rows[:, 0])) < 2:
             raise ValueError(
                 f"{path}: nothing tells where the robot was: there is no odometry"
                 f"{f' on {odometry}' if odometry else ''}, and tf does not move {base_frame}"
             )
-        self.begin = way[0][0]
+        self.begin = float(rows[0, 0])
         """Wall clock time of the first pose [s]; all else is told since then."""
-        self.way = _way(np.array(way), self.begin, track)
+        self.way = _way(rows, self.begin, track)
+        if not self.way.fastest <= FASTEST:
+            raise ValueError(
+                f"{path}: nothing tells where the robot was: its odometry has wheels at up to"
+                f" {self.way.fastest:g} m/s, and none turns faster than {FASTEST:g} m/s"
+            )
         if not self.topics:
             self.topics = tuple(sorted(topics))
         self.frame = motions[-1].frame.lstrip("/") if motions else ""
@@ -184,7 +194,10 @@ class Recording:
         found = None
         for one in messages(self.path, [GRID]):
             if _slash(one.topic) == _slash(topic):
-                found = static_map_of(one.message)
+                try:
+                    found = static_map_of(one.message)
+                except Untrusted as why:
+                    raise ValueError(f"{self.path}: on {topic}: {why}") from why
         if found is None:
             raise ValueError(f"{self.path}: no map on {topic}; give the topic of one, or a file")
         if self.frame and found[0].lstrip("/") != self.frame:
@@ -213,8 +226,14 @@ class Recording:
             else:
                 links = transforms_of(one.message)
                 self._frames.hear(links)
-                stamps = [seconds(t.header.stamp) for t in one.message.transforms]
-                if len(stamps) == len(links) and not one.topic.endswith("static"):
+                if not links or one.topic.endswith("static"):
+                    continue
+                try:
+                    stamps = [stamp_of(t) for t in one.message.transforms]
+                except Untrusted as why:
+                    self.trouble[str(why)] += 1
+                    continue
+                if len(stamps) == len(links):
                     moved += [
                         (t, child.lstrip("/"), pose)
                         for t, (_, child, pose) in zip(stamps, links, strict=True)
@@ -232,8 +251,7 @@ class Recording:
 
 
 def _way(rows: np.ndarray, begin: float, track: float) -> Way:
-    """From rows stamp, x, y, theta, speed, turn rate, of which some may be none or out of order."""
-    rows = rows[np.isfinite(rows).all(axis=1)]
+    """From rows stamp, x, y, theta, speed, turn rate, which may be out of order."""
     _, first = np.unique(rows[:, 0], return_index=True)
     rows = rows[first]
     times, poses = rows[:, 0] - begin, rows[:, 1:4].copy()

@@ -135,13 +135,23 @@ class DdsPort:
             with self._lock:
                 readers = list(self._readers)
             for reader, hear in readers:
-                for sample in reader.take(N=AT_ONCE):
+                for sample in _taken(reader):
                     if isinstance(sample, InvalidSample):
                         continue
                     try:
                         hear(sample)
                     except Exception as error:  # one message must not make the node deaf
                         print(f"a message was not understood: {error!r}", file=sys.stderr)
+
+
+def _taken(reader: Any) -> list[Any]:
+    """What came. Bytes that are no message of the topic's type raise whatever they like; that must
+    not make the node deaf, and what came together with them is lost with them."""
+    try:
+        return list(reader.take(N=AT_ONCE))
+    except Exception as error:
+        print(f"bytes that are no message: {error!r}", file=sys.stderr)
+        return []
 
 
 def filled(message: Any, tree: Tree) -> Any:

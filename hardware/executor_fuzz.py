@@ -27,7 +27,7 @@ from hardware.base_link import BaseServer, RemoteBase
 from hardware.executor import ADDRESS, BUTTON, Executor
 from hardware.executor_settings import ExecutorSettings
 from hardware.executor_trials import motion
-from hardware.fuzz import Findings, broken, carry_out
+from hardware.findings import Findings, broken, carry_out
 from hardware.letterbox import Letterbox
 from hardware.link import PlannerLink
 from hardware.messages import (

@@ -56,6 +56,8 @@ class ExecutorSettings:
 
     def __post_init__(self) -> None:
         name = "ExecutorSettings"
+        if not isinstance(self.follower, FollowerSettings):
+            raise ValueError(f"{name}.follower must be FollowerSettings; got {self.follower!r}")
         door.finite(name, "period", self.period, least=0.005, most=0.02, unit="s")
         for above_0 in (
             "bound", "feedback_timeout", "planner_timeout", "sensor_timeout", "ahead",

@@ -10,20 +10,17 @@ bounded number of bytes. The same seed makes the same inputs. The exit code is 1
 
 from __future__ import annotations
 
-import argparse
 import contextlib
 import random
-import resource
 import socket
 import sys
 import time
-import traceback
 from collections.abc import Callable
-from dataclasses import dataclass, field
 from functools import partial
 
 import numpy as np
 
+from hardware.findings import Findings, broken, carry_out
 from hardware.scip import (
     END,
     Garbled,
@@ -43,8 +40,6 @@ from hardware.scip_settings import ScipSettings
 from hardware.scip_sweep import Parameters, decode_sweep, encode_sweep
 from hardware.scip_wire import Wire
 
-LONGEST = 1.0
-"""[s] of this thread's work that an input may take."""
 PATIENCE = 10.0
 """[s] that a socket may keep another waiting: a busy machine is not a hang."""
 SMALL = Parameters(
@@ -54,44 +49,6 @@ SMALL = Parameters(
 ASKED = Measure("MD", 0, 60)
 SHARES = {"reply": 0.45, "command": 0.4, "device": 0.1, "session": 0.0495, "network": 0.0005}
 """Of the inputs; those over real sockets take the longest."""
-
-
-@dataclass(slots=True)
-class Findings:
-    """What became of the inputs."""
-
-    inputs: dict[str, int] = field(default_factory=dict)
-    refused: int = 0
-    """Inputs that the protocol itself refused."""
-    failures: list[str] = field(default_factory=list)
-    """What was raised that may not be, and over what."""
-    slowest: float = 0.0
-    """[s]."""
-    slowest_target: str = ""
-
-    def attempt(
-        self, name: str, data: bytes, eat: Callable[[], object], refusal: type[Exception]
-    ) -> None:
-        """Let a target eat an input, and note what came of it.
-
-        Args:
-            name: of the target.
-            data: the input, for the report.
-            eat: hands it over.
-            refusal: what the protocol itself may raise.
-        """
-        began = time.thread_time()
-        try:
-            eat()
-        except refusal:
-            self.refused += 1
-        except Exception:
-            self.failures.append(f"{name}: {data!r}\n{traceback.format_exc(limit=4)}")
-        took = time.thread_time() - began
-        if took > self.slowest:
-            self.slowest, self.slowest_target = took, name
-        if took > LONGEST:
-            self.failures.append(f"{name}: {took:.1f} s for {data!r}")
 
 
 def _source(_: float) -> np.ndarray:
@@ -123,29 +80,6 @@ def _right_commands() -> list[bytes]:
     ]
     commands: list[Command] = [*plain, *adjusting, *others, *measuring]
     return [command.encode() + b"\n" for command in commands]
-
-
-def broken(right: list[bytes], draw: random.Random) -> bytes:
-    """An input that was right, once."""
-    if draw.random() < 0.1:
-        return draw.randbytes(draw.randrange(200))
-    data = bytearray(draw.choice(right))
-    for _ in range(draw.randrange(4)):
-        at = draw.randrange(len(data) + 1)
-        kind = draw.randrange(6)
-        if kind == 0 and at < len(data):
-            data[at] = draw.randrange(256)
-        elif kind == 1:
-            del data[at : at + draw.randrange(1, 9)]
-        elif kind == 2:
-            data[at:at] = data[at : at + draw.randrange(1, 70)]
-        elif kind == 3:
-            del data[at:]
-        elif kind == 4:
-            data += draw.choice(right)
-        else:
-            data[at:at] = draw.choice((b"\n", b"\n\n", b"\r", b";", b"\x00", b"\xff", b"9", b"-1"))
-    return bytes(data)
 
 
 def with_sums(data: bytes) -> bytes:
@@ -324,32 +258,6 @@ def fuzz(inputs: int, draw: random.Random, targets: dict[str, float] = SHARES) -
         if isinstance(target, Network):
             target.close()
     return findings
-
-
-def carry_out(
-    description: str, module: str, fuzz: Callable[[int, random.Random], Findings]
-) -> int:
-    """The command of a fuzzer: read what is asked, throw, tell. Returns the exit code."""
-    parser = argparse.ArgumentParser(
-        description=description, epilog=f"example: python -m {module} --inputs 100000 --seed 7"
-    )
-    parser.add_argument("--inputs", type=int, default=100_000)
-    parser.add_argument("--seed", type=int, default=0)
-    given = parser.parse_args()
-    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    began = time.perf_counter()
-    findings = fuzz(given.inputs, random.Random(given.seed))
-    for name, number in findings.inputs.items():
-        print(f"{name:8s} {number:9,d} inputs")
-    grown = (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) / 1024
-    print(
-        f"{findings.refused:,d} refused by the protocol, {len(findings.failures)} failures;"
-        f" {time.perf_counter() - began:.0f} s, the slowest {1000 * findings.slowest:.1f} ms"
-        f" of work ({findings.slowest_target}); {grown:.0f} MB more memory at the most"
-    )
-    for failure in findings.failures[:10]:
-        print(failure)
-    return 1 if findings.failures else 0
 
 
 def main() -> int:

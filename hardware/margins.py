@@ -75,7 +75,7 @@ def unforeseen(change: float, duration: float) -> float:
         change: no wheel changes its speed faster than this [m/s^2].
         duration: since it was measured [s].
     """
-    return 0.5 * change * duration**2
+    return 0.5 * change * duration * duration
 
 
 def executor_settings(cycle: float, **changes: Any) -> ExecutorSettings:
@@ -100,9 +100,12 @@ def deceleration(speed: float, distance: float) -> float:
         speed: when it was told [m/s].
         distance: from there to rest [m].
     """
-    return speed**2 / (2.0 * distance)
+    return speed * speed / (2.0 * distance)
 
 
 def _up(length: float) -> float:
     """To the next centimetre; a length that is one already stays."""
-    return math.ceil(100.0 * length - 1e-9) / 100.0
+    hundredths = 100.0 * length - 1e-9
+    if not math.isfinite(hundredths):
+        raise ValueError(f"margins: {length:g} m is more than can be reckoned with")
+    return math.ceil(hundredths) / 100.0

@@ -130,6 +130,8 @@ def _configured(
         value = changed.pop(name, None)
         if value is not None:
             told[name] = value
+    # what is wrong in the file is told of before it is mixed with what else is given
+    RosSettings.from_parameters(told)
     told["settings"] = {**told.get("settings", {}), **changed}
     return RosSettings.from_parameters(told), told
 

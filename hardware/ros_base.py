@@ -22,7 +22,7 @@ from hardware.executor_process import check_private
 from hardware.priority import put_forward
 from hardware.ros_clock import RosClock
 from hardware.ros_frames import Frames, compose
-from hardware.ros_messages import Pose, Tree, Untrusted, motion_of, transforms_of, twist
+from hardware.ros_messages import Pose, Tree, Untrusted, motion_of, stop_of, transforms_of, twist
 from hardware.ros_port import BOOL, ODOMETRY, TRANSFORMS, TWIST, Port
 from hardware.ros_settings import RosSettings
 from hardware.stop_button import StopButton
@@ -171,7 +171,7 @@ class ButtonKeeper:
 
     def hear(self, message: Any) -> None:
         """Take in a std_msgs/Bool."""
-        pressed = bool(message.data)
+        pressed = stop_of(message)
         with self._news:
             if not pressed and self._wanted is None:
                 return
@@ -208,6 +208,23 @@ class ButtonKeeper:
             return not self._closed
 
 
+def placer(frames: Frames, planned: str) -> Callable[[str, Pose], Pose]:
+    """What puts a pose in the odometry's frame into the one that is planned in, as tf joins them.
+
+    Args:
+        frames: as tf tells of them.
+        planned: name of that frame; empty: the odometry's own.
+    """
+
+    def place(frame: str, pose: Pose) -> Pose:
+        origin = frames.pose(planned or frame, frame)
+        if origin is None:
+            raise Untrusted(f"tf does not join the odometry's frame with {planned}")
+        return compose(origin, pose)
+
+    return place
+
+
 def serve(port: Port, settings: RosSettings, leave: Callable[[], bool]) -> None:
     """Be the base of an executor in `settings.directory`, until `leave` says so.
 
@@ -219,17 +236,10 @@ def serve(port: Port, settings: RosSettings, leave: Callable[[], bool]) -> None:
     check_private(directory)
     times = RosClock(oldest=settings.oldest, skew=settings.skew)
     frames = Frames()
-
-    def place(frame: str, pose: Pose) -> Pose:
-        origin = frames.pose(settings.frame or frame, frame)
-        if origin is None:
-            raise Untrusted(f"tf does not join the odometry's frame with {settings.frame}")
-        return compose(origin, pose)
-
     base = RosBase(
         settings.limits, port.publisher("cmd_vel", TWIST),
         port.publisher("stop", BOOL, latched=True), times=times, child=settings.base_frame,
-        place=place,
+        place=placer(frames, settings.frame),
     )  # fmt: skip
     server = BaseServer(base, directory / SOCKET)
     keeper = ButtonKeeper(directory, lambda pressed: base.press(pressed=pressed))

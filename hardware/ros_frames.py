@@ -9,6 +9,8 @@ from hardware.ros_messages import Pose
 
 MOST_LINKS = 64
 """Of a chain of frames; a loop is no chain."""
+MOST_FRAMES = 4096
+"""That are remembered. Names come from outside: who makes them up must not fill the memory."""
 
 
 class Frames:
@@ -17,11 +19,17 @@ class Frames:
     def __init__(self) -> None:
         self._links: dict[str, tuple[str, Pose]] = {}
 
+    def __len__(self) -> int:
+        return len(self._links)
+
     def hear(self, links: Iterable[tuple[str, str, Pose]]) -> None:
-        """Take in (parent, child, pose of the child in the parent)."""
+        """Take in (parent, child, pose of the child in the parent). Once `MOST_FRAMES` are known
+        there are no new ones."""
         for parent, child, pose in links:
-            if all(map(math.isfinite, pose)):
-                self._links[_plain(child)] = (_plain(parent), pose)
+            child = _plain(child)
+            known = child in self._links or len(self._links) < MOST_FRAMES
+            if known and all(map(math.isfinite, pose)):
+                self._links[child] = (_plain(parent), pose)
 
     def pose(self, target: str, source: str) -> Pose | None:
         """The source frame's pose in the target frame; None where nothing joins them."""

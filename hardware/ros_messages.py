@@ -12,9 +12,11 @@ Sources: the definitions of sensor_msgs, nav_msgs, geometry_msgs and visualizati
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from functools import wraps
+from operator import index
+from typing import Any, ParamSpec, TypeVar
 
 import numpy as np
 
@@ -27,6 +29,8 @@ Tree = dict[str, Any]
 """A message: its fields by name; messages within it are trees, lists of them lists."""
 Pose = tuple[float, float, float]
 """(x, y, theta) [m, m, rad]."""
+P = ParamSpec("P")
+T = TypeVar("T")
 
 TOO_NEAR = 1e-3
 """The range that stands for "something is nearer than can be measured" [m]."""
@@ -34,12 +38,35 @@ UPRIGHT = 0.02
 """A range finder may lean by this [rad]: its beams then reach 2 mm less far at 10 m."""
 LEVEL = 0.2
 """A robot may lean by this on its way [rad]."""
+FARTHEST = 1e9
+"""No place is farther away than this [m]; there float64 still tells 0.1 um, and what is reckoned
+from rounding stays small."""
+MOST_BEAMS = 16_384
+"""Of a scan; what is made of one must not take longer than a cycle."""
+MOST_LETTERS = 256
+"""Of a frame's name."""
 FREE, OCCUPIED = 0, 100
 """Values of an OccupancyGrid's cell."""
 
 
 class Untrusted(ValueError):
     """A message that is not to be believed, and why: the world is unseen then."""
+
+
+def _or_untrusted(read: Callable[P, T]) -> Callable[P, T]:
+    """A reader that raises `Untrusted` and nothing else, whatever a message holds: recordings bring
+    their own definitions, in which a field may be anything, or missing."""
+
+    @wraps(read)
+    def reading(*args: P.args, **kwargs: P.kwargs) -> T:
+        try:
+            return read(*args, **kwargs)
+        except Untrusted:
+            raise
+        except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as why:
+            raise Untrusted("a message without the fields of its kind") from why
+
+    return reading
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -67,6 +94,7 @@ class Sweep:
         )  # fmt: skip
 
 
+@_or_untrusted
 def sweep_of(message: Any, *, range_max: float, beyond_is_free: bool = False) -> Sweep:
     """Read a sensor_msgs/LaserScan.
 
@@ -89,11 +117,14 @@ def sweep_of(message: Any, *, range_max: float, beyond_is_free: bool = False) ->
     Raises:
         Untrusted: its bearings or ranges make no sense.
     """
-    ranges = np.array(message.ranges, dtype=np.float64)
+    with np.errstate(invalid="ignore"):  # a NaN that signals, once it is cast
+        ranges = np.array(message.ranges, dtype=np.float64)
     low, step = float(message.angle_min), float(message.angle_increment)
     near, far = float(message.range_min), float(message.range_max)
     n = len(ranges)
-    if n < 2 or not all(map(math.isfinite, (low, step, near))) or step == 0.0 or not far > 0.0:
+    if ranges.ndim != 1 or n > MOST_BEAMS:
+        raise Untrusted(f"a scan of more than {MOST_BEAMS} beams, or none")
+    if n < 2 or not all(map(math.isfinite, (low, step, near))) or step == 0.0 or not far > TOO_NEAR:
         raise Untrusted("a scan without beams, bearings or range")
     last = low + (n - 1) * step
     # float32 sums angles up; more than a beam off, and nobody knows which beam looks where
@@ -111,7 +142,7 @@ def sweep_of(message: Any, *, range_max: float, beyond_is_free: bool = False) ->
         low, step, ranges = last, -step, ranges[::-1]
     lasts = (n - 1) * abs(float(message.time_increment))
     return Sweep(
-        frame=message.header.frame_id, stamp=seconds(message.header.stamp), ranges=ranges,
+        frame=frame_of(message), stamp=seconds(message.header.stamp), ranges=ranges,
         angle_min=low, angle_increment=step, range_max=min(range_max, far),
         lasts=lasts if math.isfinite(lasts) else math.inf,
     )  # fmt: skip
@@ -169,6 +200,7 @@ class Motion:
         return Odometry(stamp, *self.pose, *wheels_of(self.speed, self.turn_rate, track))
 
 
+@_or_untrusted
 def motion_of(message: Any) -> Motion:
     """Read a nav_msgs/Odometry. Numbers that are none stay so: the executor has a rule for them.
 
@@ -177,7 +209,7 @@ def motion_of(message: Any) -> Motion:
     """
     twist = message.twist.twist
     return Motion(
-        frame=message.header.frame_id, child=message.child_frame_id,
+        frame=frame_of(message), child=_name(message.child_frame_id),
         stamp=seconds(message.header.stamp),
         pose=planar(message.pose.pose.position, message.pose.pose.orientation, LEVEL),
         speed=float(twist.linear.x), turn_rate=float(twist.angular.z),
@@ -207,21 +239,53 @@ def twist(speed: float, turn_rate: float) -> Tree:
     }
 
 
+@_or_untrusted
 def wheels_from(message: Any, track: float) -> tuple[float, float]:
-    """(right, left) ground speeds [m/s] that a geometry_msgs/Twist asks for."""
+    """(right, left) ground speeds [m/s] that a geometry_msgs/Twist asks for.
+
+    Raises:
+        Untrusted: it is none.
+    """
     return wheels_of(float(message.linear.x), float(message.angular.z), track)
 
 
+def stop_of(message: Any) -> bool:
+    """Whether a std_msgs/Bool tells to stop. Only a plain False does not: what is none at all may
+    have been meant to."""
+    return getattr(message, "data", True) is not False
+
+
+@_or_untrusted
+def stamp_of(message: Any) -> float:
+    """When a message with a header says it is of, wall clock [s].
+
+    Raises:
+        Untrusted: it does not say.
+    """
+    return seconds(message.header.stamp)
+
+
+@_or_untrusted
+def frame_of(message: Any) -> str:
+    """The frame that a message's header names.
+
+    Raises:
+        Untrusted: it names none, or by more than `MOST_LETTERS`.
+    """
+    return _name(message.header.frame_id)
+
+
+@_or_untrusted
 def place_of(message: Any) -> tuple[str, float, float]:
     """(frame, x, y) of a geometry_msgs/PoseStamped.
 
     Raises:
-        Untrusted: numbers that are none.
+        Untrusted: numbers that are none, or beyond `FARTHEST`.
     """
     x, y = float(message.pose.position.x), float(message.pose.position.y)
-    if not (math.isfinite(x) and math.isfinite(y)):
+    if not (abs(x) <= FARTHEST and abs(y) <= FARTHEST):
         raise Untrusted(f"a goal at ({x:g}, {y:g})")
-    return message.header.frame_id, x, y
+    return frame_of(message), x, y
 
 
 def pose_stamped(pose: Pose, stamp: float, frame: str) -> Tree:
@@ -231,15 +295,25 @@ def pose_stamped(pose: Pose, stamp: float, frame: str) -> Tree:
 
 def transforms_of(message: Any) -> list[tuple[str, str, Pose]]:
     """[(parent, child, pose of the child in the parent)] of a tf2_msgs/TFMessage; what leans by
-    more than `UPRIGHT` is not in the plane and left out: whoever needs it will miss it."""
+    more than `UPRIGHT` is not in the plane and left out, as is what is no transform: whoever needs
+    it will miss it."""
     found = []
-    for one in message.transforms:
+    try:
+        told = list(message.transforms)
+    except (AttributeError, TypeError):
+        return []
+    for one in told:
         try:
-            pose = planar(one.transform.translation, one.transform.rotation, UPRIGHT)
+            found.append(_link_of(one))
         except Untrusted:
             continue
-        found.append((one.header.frame_id, one.child_frame_id, pose))
     return found
+
+
+@_or_untrusted
+def _link_of(message: Any) -> tuple[str, str, Pose]:
+    pose = planar(message.transform.translation, message.transform.rotation, UPRIGHT)
+    return frame_of(message), _name(message.child_frame_id), pose
 
 
 def transforms(links: Iterable[tuple[str, str, Pose]], stamp: float) -> Tree:
@@ -296,6 +370,7 @@ def map_message(known: StaticMap, stamp: float, frame: str) -> Tree:
     return tree
 
 
+@_or_untrusted
 def static_map_of(message: Any) -> tuple[str, StaticMap]:
     """(frame, map) of a nav_msgs/OccupancyGrid. Only cells that are surely occupied are taken for
     what stays: what is unknown, or likely, may be anything.
@@ -305,16 +380,18 @@ def static_map_of(message: Any) -> tuple[str, StaticMap]:
     """
     info = message.info
     x, y, yaw = planar(info.origin.position, info.origin.orientation, UPRIGHT)
-    data = np.array(message.data, dtype=np.int16)
-    if not len(data) or len(data) != info.width * info.height:
-        raise Untrusted(f"a map of {info.width} times {info.height} cells with {len(data)} values")
-    occupied = data.reshape(info.height, info.width) == OCCUPIED
+    data = np.asarray(message.data)
+    width, height = index(info.width), index(info.height)
+    if not len(data) or len(data) != width * height:
+        raise Untrusted(f"a map of {width} times {height} cells with {len(data)} values")
+    # no cast before this: a number that wraps round to it, or a text, is not surely occupied
+    occupied = data.reshape(height, width) == OCCUPIED
     # the shortest number that is this float32: 0.05 and not 0.0500000007, or a ring of cells that
     # lie just as far from a wall as is tolerated would be lost; 1000 cells shift by 1 um
     with np.errstate(over="ignore"):
         resolution = float(str(np.float32(info.resolution)))
     try:
-        return message.header.frame_id, StaticMap(occupied, resolution, (x, y, yaw))
+        return frame_of(message), StaticMap(occupied, resolution, (x, y, yaw))
     except ValueError as why:
         raise Untrusted(f"a map that is none: {why}") from why
 
@@ -348,12 +425,21 @@ def seconds(time: Any) -> float:
     return float(time.secs + 1e-9 * time.nsecs)
 
 
+def _name(frame: object) -> str:
+    if not isinstance(frame, str) or len(frame) > MOST_LETTERS:
+        raise Untrusted(f"a frame whose name is none, or of more than {MOST_LETTERS} letters")
+    return frame
+
+
 def planar(position: Any, orientation: Any, lean: float) -> Pose:
     """(x, y, theta) of a pose whose z axis is upright within `lean` [rad].
 
     Raises:
-        Untrusted: it is not, or the orientation is no quaternion.
+        Untrusted: it is not, the orientation is no quaternion, or the place is beyond `FARTHEST`.
     """
+    place = float(position.x), float(position.y)
+    if any(FARTHEST < abs(p) < math.inf for p in place):
+        raise Untrusted(f"a place farther away than {FARTHEST:g} m")
     x, y, z, w = (float(getattr(orientation, name)) for name in "xyzw")
     norm = x * x + y * y + z * z + w * w
     if not abs(norm - 1.0) < 0.02:
@@ -361,4 +447,4 @@ def planar(position: Any, orientation: Any, lean: float) -> Pose:
     if 1.0 - 2.0 * (x * x + y * y) / norm < math.cos(lean):
         raise Untrusted(f"an orientation that leans by more than {lean:g} rad")
     theta = math.atan2(2 * (w * z + x * y), norm - 2 * (y * y + z * z))
-    return float(position.x), float(position.y), theta
+    return *place, theta

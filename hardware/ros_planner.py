@@ -31,9 +31,10 @@ from hardware.ros_frames import Frames, compose
 from hardware.ros_messages import (
     Sweep,
     Untrusted,
+    motion_of,
     path,
     place_of,
-    seconds,
+    stamp_of,
     static_map_of,
     sweep_of,
     transforms_of,
@@ -52,6 +53,7 @@ from hardware.ros_port import (
 from hardware.ros_settings import RosSettings
 from hardware.sleep import Slept, asleep
 from hardware.status import State
+from passpmp_ti.grid.model import check_door
 from passpmp_ti.grid.static_map import StaticMap
 from passpmp_ti.planner.navigator import Navigator
 from passpmp_ti.scan import Scan
@@ -65,6 +67,8 @@ MOVED_GOAL = 0.05
 """A goal that moves by less than this, as localisation does, is the same goal [m]."""
 MOST_REASONS = 40
 """That are told apart."""
+LONGEST_REASON = 400
+"""[letters]"""
 PRIORITY = 1
 """Of SCHED_FIFO, where it is granted: below the base's and the executor's."""
 TELL = 1.0
@@ -259,6 +263,9 @@ class Planner:
             self._count(f"a goal in {frame}, which tf does not join with {self._frame}")
             return
         goal = compose(origin, (x, y, 0.0))[:2]
+        if not all(map(math.isfinite, goal)):
+            self._count(f"a goal in {frame}, which tf puts beyond all numbers")
+            return
         if math.dist(goal, self.navigator.goal) > MOVED_GOAL:
             self.navigator.head_for(goal)
 
@@ -317,6 +324,7 @@ class Planner:
 
     def _count(self, why: str) -> None:
         # reasons may hold names from outside: who makes them up must not fill the memory
+        why = why[:LONGEST_REASON]
         known = why in self.unseen or len(self.unseen) < MOST_REASONS
         self.unseen[why if known else "other reasons"] += 1
 
@@ -325,7 +333,7 @@ class Planner:
     def _hear_scan(self, stream: int, message: Any) -> None:
         settings = self.settings
         try:
-            stamp = self._times.ours(seconds(message.header.stamp))
+            stamp = self._times.ours(stamp_of(message))
             sweep = sweep_of(
                 message, range_max=settings.range_max, beyond_is_free=settings.beyond_is_free
             )
@@ -344,17 +352,28 @@ class Planner:
         self._news.set()
 
     def _hear_odometry(self, message: Any) -> None:
-        if not self._frame:
-            self._frame = message.header.frame_id.lstrip("/")
+        if self._frame:
+            return
+        try:
+            motion = motion_of(message)
+            if motion.child.lstrip("/") != self.settings.base_frame.lstrip("/"):
+                # one frame is planned in for good: whoever else is about must not name it
+                raise Untrusted(f"odometry of a frame that is not {self.settings.base_frame}")
+            self._frame = motion.frame.lstrip("/")
+        except Untrusted as why:
+            self._count(str(why))
 
     def _hear_frames(self, message: Any) -> None:
         self._frames.hear(transforms_of(message))
 
     def _hear_map(self, message: Any) -> None:
         try:
-            self._map = static_map_of(message)
-        except Untrusted as why:
+            found = static_map_of(message)
+            check_door(self.navigator.settings, found[1].resolution)
+        except ValueError as why:
             self._count(str(why))
+        else:
+            self._map = found
 
     def _hear_goal(self, message: Any) -> None:
         try:

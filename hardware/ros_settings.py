@@ -113,8 +113,16 @@ class RosSettings:
 
     def __post_init__(self) -> None:
         name = "RosSettings"
-        if not self.scans or isinstance(self.scans, str):
+        if not isinstance(self.scans, (list, tuple)) or not self.scans:
             raise ValueError(f"{name}.scans must be topics, as ['scan']; got {self.scans!r}")
+        for n, topic in enumerate(self.scans):
+            door.text(name, f"scans[{n}]", topic)
+        for text in ("base_frame", "frame", "map", "backend"):
+            door.text(name, text, getattr(self, text))
+        if not isinstance(self.beyond_is_free, bool):
+            raise ValueError(
+                f"{name}.beyond_is_free must be true or false; got {self.beyond_is_free!r}"
+            )
         object.__setattr__(self, "scans", tuple(self.scans))
         for above_0 in (
             "range_max", "sweep", "oldest", "cycle", "odometry_period", "show_every", "show_cell",
@@ -145,7 +153,7 @@ class RosSettings:
         Raises:
             ValueError: an unknown name (the nearest is suggested), or a value out of its range.
         """
-        values = dict(given)
+        values = dict(_mapping("parameters", given))
         _check_names("", values, [f.name for f in fields(cls)])
         for name, kind in (("robot", DifferentialDrive), ("limits", BaseLimits)):
             if name in values:
@@ -153,13 +161,14 @@ class RosSettings:
                 known = [f.name for f in fields(kind) if f.init]
                 _check_names(f"{name}.", own, known)
                 if "discs" in own:
-                    own["discs"] = tuple(tuple(disc) for disc in own["discs"])
+                    rows = door.array("RosSettings.robot", "discs", own["discs"], (None, 2))
+                    own["discs"] = tuple((float(offset), float(radius)) for offset, radius in rows)
                 values[name] = kind(**own)
         for name in ("settings", "executor"):
             if name in values:
                 values[name] = dict(_mapping(name, values[name]))
         if values.get("directory"):
-            values["directory"] = Path(values["directory"])
+            values["directory"] = Path(door.text("RosSettings", "directory", values["directory"]))
         else:
             values.pop("directory", None)
         return cls(**values)
@@ -225,7 +234,10 @@ class RosSettings:
         own = dict(self.executor)
         _check_names("executor.", own, [f.name for f in fields(ExecutorSettings)])
         if isinstance(own.get("follower"), Mapping):
-            own["follower"] = FollowerSettings(**own["follower"])
+            follower = dict(own["follower"])
+            known = [f.name for f in fields(FollowerSettings)]
+            _check_names("executor.follower.", follower, known)
+            own["follower"] = FollowerSettings(**follower)
         return executor_settings(self.cycle, **own)
 
     def planner_settings(self) -> Settings:
@@ -272,7 +284,9 @@ def read_parameters(path: str | Path) -> dict[str, Any]:
     """
     try:
         told = yaml.safe_load(Path(path).read_text())
-    except (OSError, UnicodeDecodeError, yaml.YAMLError) as cause:
+    except Exception as cause:
+        # values within each other by the hundred, and tags as `!!bool maybe`, have PyYAML raise
+        # whatever comes
         raise ValueError(f"{path}: cannot be read; {cause}") from cause
     if told is not None and not isinstance(told, dict):
         raise ValueError(f"{path}: must hold names and values; got {told!r}")
@@ -280,7 +294,7 @@ def read_parameters(path: str | Path) -> dict[str, Any]:
 
 
 def _mapping(name: str, value: object) -> Mapping[str, Any]:
-    if not isinstance(value, Mapping):
+    if not isinstance(value, Mapping) or not all(isinstance(key, str) for key in value):
         raise ValueError(f"RosSettings.{name} must be names and values; got {value!r}")
     return value
 

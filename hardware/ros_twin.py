@@ -23,6 +23,7 @@ from hardware.priority import put_forward
 from hardware.ros_clock import RosClock
 from hardware.ros_messages import (
     Pose,
+    Untrusted,
     laser_scan,
     map_message,
     odometry_message,
@@ -76,6 +77,10 @@ class RosTwinSettings:
     """File that tells, at the end, what it came to; empty: none."""
 
     def __post_init__(self) -> None:
+        for name in ("scenario", "summary"):
+            door.text("RosTwinSettings", name, getattr(self, name))
+        if self.object_speed is not None:
+            door.finite("RosTwinSettings", "object_speed", self.object_speed, least=0.0, unit="m/s")
         door.choice("RosTwinSettings", "chair", self.chair, KINDS)
         door.whole("RosTwinSettings", "seed", self.seed, least=0)
         door.finite("RosTwinSettings", "greeting", self.greeting, least=0.0, unit="s")
@@ -218,7 +223,10 @@ class RosTwin:
         }  # fmt: skip
 
     def _hear(self, message: Any) -> None:
-        self._wanted = wheels_from(message, self._track)
+        try:
+            self._wanted = wheels_from(message, self._track)
+        except Untrusted:
+            return  # as if nothing had been said
 
     def _tell_odometry(self) -> None:
         odometry = self._chair.odometry()

@@ -44,7 +44,10 @@ def finite(
     refusal = ValueError(f"{owner}.{name} must be {rule}; got {value!r}")
     if isinstance(value, bool) or not isinstance(value, (int, float, np.integer, np.floating)):
         raise refusal
-    number = float(value)
+    try:
+        number = float(value)
+    except OverflowError:  # a whole number of more than 308 digits
+        raise refusal from None
     if not math.isfinite(number):
         raise refusal
     if above is not None and not number > above:
@@ -64,6 +67,13 @@ def whole(owner: str, name: str, value: object, *, least: int, most: int | None 
         rule = f">= {least}" + (f" and <= {most}" if most is not None else "")
         raise ValueError(f"{owner}.{name} must be {rule}; got {value!r}")
     return int(value)
+
+
+def text(owner: str, name: str, value: object) -> str:
+    """Return `value` if it is a text, or refuse it."""
+    if not isinstance(value, str):
+        raise ValueError(f"{owner}.{name} must be a text; got {value!r}")
+    return value
 
 
 def choice(owner: str, name: str, value: object, allowed: Iterable[str]) -> str:
@@ -91,7 +101,7 @@ def array(owner: str, name: str, value: object, shape: tuple[int | None, ...]) -
     """
     try:
         given = np.asarray(value, dtype=np.float64)
-    except (TypeError, ValueError) as cause:
+    except (TypeError, ValueError, OverflowError) as cause:
         raise ValueError(f"{owner}.{name} must be numbers; got {value!r}") from cause
     wanted = "(" + ", ".join("n" if n is None else str(n) for n in shape) + ")"
     if given.ndim != len(shape) or any(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, fields, replace
 from typing import Any
 
@@ -212,7 +213,7 @@ class Settings:
                 f" {self.sub_swarms} of one size"
             )
         step_ms = self.time_step * 1000
-        if abs(step_ms - round(step_ms)) > 1e-6:
+        if not _is_whole(step_ms):
             raise ValueError(
                 f"Settings.time_step must be a whole number of milliseconds; got {step_ms:g} ms"
             )
@@ -224,7 +225,7 @@ class Settings:
         ]:
             door.finite(name, field_, value, above=0.0, unit="s")
             count = value / self.time_step
-            if abs(count - round(count)) > 1e-6:
+            if not _is_whole(count):
                 raise ValueError(
                     f"Settings.{field_} = {value:g} s must be a whole number of time steps of"
                     f" {self.time_step:g} s, so that plans are verified and held at the same times"
@@ -380,3 +381,8 @@ def integration_margin(robot: Robot, time_step: float) -> float:
     braking. A millimetre more for f32. Measured in the tests.
     """
     return robot.integration_error(time_step) + 1e-3
+
+
+def _is_whole(count: float) -> bool:
+    """Whether it is a whole number, but for rounding, from 1 on."""
+    return math.isfinite(count) and round(count) >= 1 and abs(count - round(count)) <= 1e-6

@@ -14,6 +14,7 @@ from hardware.bags_drive import DriveWriter
 from hardware.bags_recording import Recording
 from hardware.base import Odometry
 from hardware.ros_messages import TOO_NEAR, laser_scan, odometry_message, transforms
+from passpmp_ti.cli import main
 from passpmp_ti.scan import Scan
 
 WALL = 1.7e9
@@ -143,3 +144,60 @@ def test_bad_recordings_are_refused_by_name(tmp_path):
         Recording(tmp_path / "drive.bag", track=0.5, scans=["front"])
     with pytest.raises(ValueError, match="nothing tells where the robot was"):
         Recording(tmp_path / "drive.bag", track=0.5, odometry="wheels")
+
+
+@pytest.mark.parametrize("suffix", [".bag", ".mcap"])
+@pytest.mark.parametrize(
+    "broken",
+    [
+        lambda told: told[: len(told) // 2],
+        lambda told: told[:200] + b"\xff" * 8 + told[200:],
+        lambda told: told[:-40] + b"\xff" * 40,
+        lambda told: b"\xc1" + told,
+        lambda told: b"",
+    ],
+)
+def test_a_broken_recording_is_refused_by_name_whatever_its_reader_raises(
+    tmp_path, capsys, suffix, broken
+):
+    drive(tmp_path / f"right{suffix}", 0.2)
+    path = tmp_path / f"broken{suffix}"
+    path.write_bytes(broken((tmp_path / f"right{suffix}").read_bytes()))
+    with pytest.raises(ValueError, match=f"broken{suffix}"):
+        Recording(path, track=0.5)
+    assert main(["replay", str(path)]) == 2
+    assert len(capsys.readouterr().err.splitlines()) == 1
+
+
+def test_a_replay_with_a_robot_s_file_that_is_none_ends_with_one_line(tmp_path, capsys):
+    drive(tmp_path / "drive.bag", 0.2)
+    (tmp_path / "robot.yaml").write_text("settings: 5\n")
+    given = ["replay", str(tmp_path / "drive.bag"), "--config", str(tmp_path / "robot.yaml")]
+    assert main(given) == 2
+    (told,) = capsys.readouterr().err.splitlines()
+    assert "settings must be names and values" in told
+
+
+def test_odometry_of_no_robot_is_refused_by_name(tmp_path):
+    # braking from such a speed would be reckoned step by step, without an end
+    for name, speed in (("fast", 1e9), ("none", math.nan)):
+        with BagWriter(tmp_path / f"{name}.mcap") as bag:
+            for k in range(4):
+                t = WALL + 0.1 * k
+                told = Odometry(0.0, 0.1 * k, 0.0, 0.0, speed, speed)
+                tree = odometry_message(told, t, "odom", "base", 0.5)
+                bag.write("/odom", "nav_msgs/Odometry", tree, t)
+                bag.write("/scan", "sensor_msgs/LaserScan", laser_scan(scan_at(0.0), t, "l"), t)
+        with pytest.raises(ValueError, match=rf"{name}\.mcap: nothing tells where the robot was"):
+            Recording(tmp_path / f"{name}.mcap", track=0.5)
+
+
+def test_a_map_that_is_none_is_refused_by_the_recordings_name(tmp_path):
+    path = tmp_path / "map.mcap"
+    drive(path, 0.2)
+    recording = Recording(path, track=0.5)
+    with BagWriter(tmp_path / "other.mcap") as bag:
+        bag.write("/map", "nav_msgs/OccupancyGrid", {"data": np.zeros(3, dtype=np.int8)}, WALL)
+    recording.path = tmp_path / "other.mcap"
+    with pytest.raises(ValueError, match=r"other\.mcap: on /map"):
+        recording.static_map("/map")

@@ -151,7 +151,7 @@ class FutureModel:
                 f" {apart[0]}; make one model after the other instead, with previous="
             )
         if static_map is not None:
-            _check_door(settings, static_map.resolution)
+            check_door(settings, static_map.resolution)
         if previous is not None:
             check_previous(previous, robot, settings, stamp)
         if position is None:
@@ -516,7 +516,7 @@ class FutureModel:
         return self.ticks_of(times)
 
 
-def _check_door(settings: Settings, resolution: float) -> None:
+def check_door(settings: Settings, resolution: float) -> None:
     """Refuse a map on which a door as wide as an object would be taken for wall.
 
     Its jambs are grown by the tolerance and reach up to a cell into it; what is left must be as

@@ -42,6 +42,8 @@ class Document:
             raise ValueError(f"{path}:{line}: not YAML: {cause.problem}") from cause
         except yaml.YAMLError as cause:
             raise ValueError(f"{path}: not YAML: {cause}") from cause
+        except RecursionError as cause:
+            raise ValueError(f"{path}: too deep: hundreds of values within each other") from cause
         if not isinstance(node, yaml.MappingNode):
             raise ValueError(f"{path}:1: must be a mapping of keys to values; got something else")
         self.root = Section(self, node, "")
@@ -157,10 +159,13 @@ class Section:
     def items(self) -> list[tuple[str, Any, int]]:
         """(key, value, line) of all that is there; all of it counts as asked for."""
         self._asked.extend(self._keys)
-        return [
-            (key, _plain(node), head.start_mark.line + 1)
-            for key, (head, node) in self._keys.items()
-        ]
+        found = []
+        for key, (head, node) in self._keys.items():
+            try:
+                found.append((key, _plain(node), head.start_mark.line + 1))
+            except ValueError as problem:
+                self._blame(head, f"{self._full(key)}: {problem}")
+        return found
 
     def finish(self) -> None:
         """Note every key that was never asked for, with the nearest that is allowed."""
@@ -194,5 +199,6 @@ def _plain(node: yaml.Node) -> Any:
     constructor = yaml.constructor.SafeConstructor()
     try:
         return constructor.construct_document(node)
-    except yaml.YAMLError as cause:
+    except (yaml.YAMLError, ValueError, TypeError, AttributeError, LookupError) as cause:
+        # a tag, as `!!bool maybe`, has PyYAML raise all of these
         raise ValueError(f"not a plain value: {cause}") from cause
