@@ -9,6 +9,10 @@ from typing import NamedTuple, Protocol
 from passpmp_ti import door
 from passpmp_ti.robots import DifferentialDrive
 
+FARTHEST = 1e9
+"""No place is farther away than this [m]; there float64 still tells 0.1 um, and what is reckoned
+from rounding stays small."""
+
 
 class Odometry(NamedTuple):
     """Where a base is, and how fast its wheels turn, at one instant."""
@@ -26,8 +30,9 @@ class Odometry(NamedTuple):
 
     @property
     def whole(self) -> bool:
-        """Whether every number is one."""
-        return all(map(math.isfinite, self))
+        """Whether every number is one, and the place no farther away than any is."""
+        near = abs(self.x) <= FARTHEST and abs(self.y) <= FARTHEST
+        return near and all(map(math.isfinite, self))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

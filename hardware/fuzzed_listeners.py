@@ -10,13 +10,13 @@ from typing import Any
 
 import numpy as np
 
-from hardware.base import BaseLimits, wheels_of
+from hardware.base import FARTHEST, BaseLimits, wheels_of
 from hardware.broken_trees import as_message, broken_tree
 from hardware.fuzzed_messages import MOVED, NOW, RIGHT
 from hardware.ros_base import RosBase, placer
 from hardware.ros_clock import RosClock
 from hardware.ros_frames import MOST_FRAMES, Frames
-from hardware.ros_messages import FARTHEST, Tree, stop_of, transforms_of
+from hardware.ros_messages import Tree, stop_of, transforms_of
 from hardware.ros_planner import MOST_REASONS, Planner
 from hardware.ros_port import BOOL, GRID, ODOMETRY, POSE, SCAN, TRANSFORMS
 from hardware.ros_settings import RosSettings

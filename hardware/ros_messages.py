@@ -20,7 +20,7 @@ from typing import Any, ParamSpec, TypeVar
 
 import numpy as np
 
-from hardware.base import Odometry, twist_of, wheels_of
+from hardware.base import FARTHEST, Odometry, twist_of, wheels_of
 from passpmp_ti.grid.static_map import StaticMap
 from passpmp_ti.scan import Scan
 from passpmp_ti.trajectory import Trajectory
@@ -38,9 +38,6 @@ UPRIGHT = 0.02
 """A range finder may lean by this [rad]: its beams then reach 2 mm less far at 10 m."""
 LEVEL = 0.2
 """A robot may lean by this on its way [rad]."""
-FARTHEST = 1e9
-"""No place is farther away than this [m]; there float64 still tells 0.1 um, and what is reckoned
-from rounding stays small."""
 MOST_BEAMS = 16_384
 """Of a scan; what is made of one must not take longer than a cycle."""
 MOST_LETTERS = 256

@@ -310,3 +310,12 @@ def test_a_base_is_built_from_plain_numbers():
     assert base.truth[1:4] == (1.0, 2.0, 0.5)
     with pytest.raises(ValueError, match="slip"):
         build(slip=1.5)
+
+
+@pytest.mark.parametrize("bad", [math.nan, math.inf, -2e9, 1e13])
+def test_odometry_that_nobody_can_be_at_is_not_whole(bad):
+    assert Odometry(1.0, 999.0, -5.0, 0.3, 0.1, 0.1).whole
+    for n in (1, 2):
+        values = [1.0, 2.0, 3.0, 0.3, 0.1, 0.1]
+        values[n] = bad
+        assert not Odometry(*values).whole

@@ -11,6 +11,7 @@ import yaml
 
 from hardware import fuzzed_messages, ros_base, ros_fuzz, ros_planner
 from hardware import ros_messages as ros
+from hardware.base import FARTHEST
 from hardware.broken_trees import as_message, broken_tree
 from hardware.config_file import read_config
 from hardware.dds import _taken
@@ -20,7 +21,7 @@ from hardware.fuzzed_listeners import SETTINGS, Planners, StubPort
 from hardware.fuzzed_messages import RIGHT
 from hardware.margins import deceleration, executor_settings, with_margins
 from hardware.ros_frames import MOST_FRAMES, Frames
-from hardware.ros_messages import FARTHEST, MOST_BEAMS, MOST_LETTERS, OCCUPIED, Untrusted
+from hardware.ros_messages import MOST_BEAMS, MOST_LETTERS, OCCUPIED, Untrusted
 from hardware.ros_planner import LONGEST_REASON, Planner
 from hardware.ros_port import BOOL, GRID, ODOMETRY, POSE, SCAN, TRANSFORMS, TWIST
 from hardware.ros_settings import RosSettings, read_parameters
