@@ -3,6 +3,7 @@
 import math
 import random
 import time
+from contextlib import contextmanager
 
 import numpy as np
 import pytest
@@ -258,22 +259,24 @@ def test_the_robots_state_is_told_for_the_time_of_a_scan(chain):
     assert chain.link.state_at(0.0) is None
 
 
-def test_no_state_is_guessed_for_longer_than_the_margins_hold(chain):
-    with PlannerLink(chain.directory, track=ROBOT.track, guess=0.03, clock=chain.clock) as link:
+@contextmanager
+def guessing(chain, guess):
+    """(a link of its own that guesses for so long, the stamp of the newest odometry it knows)."""
+    with PlannerLink(chain.directory, track=ROBOT.track, guess=guess, clock=chain.clock) as link:
         link.poll()
         chain.tick()
         link.poll()
-        newest = link.status.odometry[-1].stamp
+        yield link, link.status.odometry[-1].stamp
+
+
+def test_no_state_is_guessed_for_longer_than_the_margins_hold(chain):
+    with guessing(chain, 0.03) as (link, newest):
         assert link.state_at(newest + 0.029) is not None
         assert link.state_at(newest + 0.031) is None
 
 
 def test_a_sensors_place_is_told_from_odometry_before_and_after_and_never_guessed(chain):
-    with PlannerLink(chain.directory, track=ROBOT.track, guess=0.03, clock=chain.clock) as link:
-        link.poll()
-        chain.tick()
-        link.poll()
-        newest = link.status.odometry[-1].stamp
+    with guessing(chain, 0.03) as (link, newest):
         assert link.state_at(newest + 0.001) is not None
         assert np.array_equal(link.state_between(newest - 0.004), link.state_at(newest - 0.004))
         chain.now = newest + 0.031  # nothing is on its way any more
