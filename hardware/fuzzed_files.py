@@ -31,7 +31,7 @@ ON_ROBOT: dict[str, Any] = {
     "beyond_is_free": False, "sweep": 0.02, "stamped": "first", "skew": 0.0, "oldest": 0.5,
     "apart": 0.01, "pose_error": 0.01, "heading_error": 0.01, "range_error": 0.04,
     "odometry_period": 0.02, "mode": "conservative", "cycle": 0.1, "object_speed": 1.0, "seed": 0,
-    "directory": "/tmp/passpmp", "backend": "cpu", "threads": 1, "show_every": 0.5,
+    "directory": str(SETTINGS.directory), "backend": "cpu", "threads": 1, "show_every": 0.5,
     "show_cell": 0.1, "show_reach": 5.0,
     "robot": {"discs": [[0.0, 0.4]], "wheel_speed": 1.0, "acceleration": 1.0, "track": 0.54},
     "limits": {"wheel_speed": 1.2, "acceleration": 1.2, "track": 0.54, "command_timeout": 0.25},
