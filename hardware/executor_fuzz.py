@@ -17,7 +17,6 @@ import sys
 import tempfile
 import zlib
 from collections.abc import Callable
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -183,14 +182,14 @@ def fuzz(inputs: int, draw: random.Random) -> Findings:
         draw: decides what they are.
     """
     findings, right = Findings(), right_messages()
+
+    def made() -> bytes:
+        data = broken(right, draw)
+        return summed(data) if draw.random() < 0.5 else data
+
     for name, share in SHARES.items():
         target = TARGETS[name](draw)
-        findings.inputs[name] = round(inputs * share)
-        for _ in range(findings.inputs[name]):
-            data = broken(right, draw)
-            if draw.random() < 0.5:
-                data = summed(data)
-            findings.attempt(name, data, partial(target.eat, data), MessageError)
+        findings.throw(name, round(inputs * share), made, target.eat, MessageError)
         target.close()
     return findings
 

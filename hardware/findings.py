@@ -9,6 +9,8 @@ import time
 import traceback
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import partial
+from typing import Any
 
 LONGEST = 1.0
 """[s] of this thread's work that an input may take."""
@@ -28,6 +30,25 @@ class Findings:
     slowest: float = 0.0
     """[s]."""
     slowest_target: str = ""
+
+    def throw(
+        self,
+        name: str,
+        count: int,
+        made: Callable[[], Any],
+        eat: Callable[[Any], object],
+        refusal: type[Exception] | tuple[()],
+    ) -> None:
+        """Let a target eat `count` inputs, one after the other; see `attempt`.
+
+        Args:
+            made: makes the next input.
+            eat: hands one over.
+        """
+        self.inputs[name] = count
+        for _ in range(count):
+            data = made()
+            self.attempt(name, data, partial(eat, data), refusal)
 
     def attempt(
         self,

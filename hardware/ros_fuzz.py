@@ -90,10 +90,8 @@ def fuzz(inputs: int, draw: random.Random, shares: dict[str, float] = SHARES) ->
         if name in left_out:
             continue
         target = TARGETS[name](draw)
-        findings.inputs[name] = round(inputs * share)
-        for _ in range(findings.inputs[name]):
-            data = target.made(draw)
-            findings.attempt(name, data, partial(target.eat, data), target.refusal)
+        made = partial(target.made, draw)
+        findings.throw(name, round(inputs * share), made, target.eat, target.refusal)
         target.close()
     return findings
 
